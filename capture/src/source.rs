@@ -1,0 +1,19 @@
+//! Where frames come from.
+
+use crate::{calibration::Calibration, error::CaptureError, frame::Frame};
+
+/// A sensor, a recording or a simulator.
+pub trait FrameSource: Send {
+    /// What the source is, for people: "recording s.mcap", "simulated azure".
+    fn name(&self) -> String;
+
+    fn calibration(&self) -> &Calibration;
+
+    /// The next frame in order; `None` at the end. Blocks while a live sensor has nothing new.
+    fn next_frame(&mut self) -> Result<Option<Frame>, CaptureError>;
+
+    /// How many frames there are in all, where that is known.
+    fn frame_count(&self) -> Option<u64> {
+        None
+    }
+}

@@ -1,0 +1,14 @@
+//! From raw depth to clean geometry: cleaning, person mask, vertex and normal maps, TSDF fusion, meshes.
+//!
+//! In: [`effigy_capture::Frame`]s. Out: [`CleanFrame`]s and [`TriangleMesh`]es, in the depth camera's
+//! space (x right, y down, z forward, metres).
+
+pub mod clean;
+pub mod error;
+pub mod maps;
+pub mod mesh;
+
+pub use clean::CleanFrame;
+pub use error::FusionError;
+pub use maps::{DepthMap, NormalMap, VertexMap};
+pub use mesh::TriangleMesh;

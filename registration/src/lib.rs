@@ -1,0 +1,13 @@
+//! The body: SMPL model and files, motion, and how a body is fitted to depth and followed.
+//!
+//! In: `effigy_fusion::CleanFrame`s. Out: [`RegisteredFrame`]s: a [`BodyParams`] in world space
+//! (y up, floor at y = 0, metres), or the word that the body is lost.
+
+pub mod error;
+pub mod motion;
+pub mod registered;
+pub mod smpl;
+
+pub use error::RegistrationError;
+pub use registered::{RegisteredFrame, Tracking};
+pub use smpl::{BodyModel, BodyParams, PosedBody};

@@ -1,0 +1,20 @@
+//! SMPL: the model's arrays, its parameters, linear blend skinning, star pose and unit box.
+//!
+//! `rest` space is SMPL's zero pose (y up, facing +z, left = +x, metres). Equations: Loper et al. 2015,
+//! and `docs/spaces.md`.
+
+mod joints;
+mod lbs;
+mod model;
+mod params;
+mod rodrigues;
+mod star_pose;
+mod unit_box;
+
+pub use joints::{JOINT_COUNT, JOINT_NAMES, PARENTS};
+pub use lbs::{BoneTransforms, PosedBody};
+pub use model::{BodyIdentity, BodyModel, PoseDirection, SparseRow, VertexWeights};
+pub use params::BodyParams;
+pub use rodrigues::rotation_from_axis_angle;
+pub use star_pose::{STAR_HALF_ANGLE_RAD, star_transforms};
+pub use unit_box::UnitBox;

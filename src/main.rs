@@ -1,0 +1,3 @@
+//! Effigy: one depth camera in, a live avatar out.
+
+fn main() {}

@@ -1,0 +1,1 @@
+//! Scenes and assertions shared by the cross-crate tests.

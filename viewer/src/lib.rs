@@ -1,0 +1,1 @@
+//! The window, and the same pictures as files.
