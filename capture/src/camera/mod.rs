@@ -1,7 +1,10 @@
 //! Cameras: pinhole intrinsics, lens distortion, rigid transforms.
 
+mod brown_conrady;
 mod intrinsics;
+mod kannala_brandt;
 mod model;
+mod newton;
 mod rigid;
 
 pub use intrinsics::Intrinsics;
