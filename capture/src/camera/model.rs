@@ -171,7 +171,12 @@ mod tests {
         let folding = camera(Distortion::BrownConrady([
             -0.3, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0,
         ]));
-        assert!(folding.ray(vec2(2000.0, 333.0)).is_nan());
+        let ray = folding.ray(vec2(2000.0, 333.0));
+        assert!(
+            ray.is_nan(),
+            "{ray} projects to {}",
+            folding.project(ray.extend(1.0))
+        );
         assert!(folding.unproject(vec2(2000.0, 333.0), 1.0).is_nan());
     }
 

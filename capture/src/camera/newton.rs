@@ -33,7 +33,7 @@ pub(super) fn invert_2d(f: impl Fn(Vec2) -> (Vec2, [f32; 3]), target: Vec2) -> V
         (value, jacobian) = at;
     }
     let close = (value - target).abs().max_element() < LOOSE_TOLERANCE * (1.0 + p.length());
-    if close && determinant(jacobian) > 0.0 {
+    if close && jacobian[0] > 0.0 && determinant(jacobian) > 0.0 {
         p
     } else {
         Vec2::NAN
