@@ -2,6 +2,7 @@
 
 pub mod closest_point;
 pub mod components;
+pub mod marching_cubes;
 
 pub mod normals;
 pub mod ply;
