@@ -4,10 +4,24 @@
 //! In: `effigy_registration::RegisteredFrame`s. Out: an avatar that can be posed. Works in `canonical`
 //! (star pose, metres) and `unit` space (canonical in [-1, 1]^3).
 
+pub mod canonicalise;
+pub mod drive;
+pub mod error;
+pub mod keyframes;
+pub mod mesher;
+pub mod metrics;
+pub mod model;
+mod neighbors;
 pub mod pose_input;
 pub mod samples;
 pub mod sdf;
+pub mod skinning;
 
+pub use canonicalise::{CanonicaliseConfig, Canonicaliser};
+pub use drive::{AvatarMesh, DriveConfig, Driver};
+pub use error::AvatarError;
+pub use keyframes::{KeyframeConfig, KeyframeSelector};
+pub use model::{Avatar, PoseField, Subject, TopologyConfig};
 pub use pose_input::PoseInput;
 pub use samples::CanonicalSamples;
 pub use sdf::SignedDistanceField;

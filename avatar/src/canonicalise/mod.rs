@@ -1,0 +1,350 @@
+//! From a registered depth frame to canonical samples: points on the person's surface and in the empty
+//! space around it, moved to star pose and unit space.
+
+mod free_space;
+
+use std::sync::Arc;
+
+use effigy_fusion::CleanFrame;
+use effigy_registration::{BodyModel, BodyParams, PosedBody, RegisteredFrame};
+use glam::Vec3;
+use rand::{RngExt as _, SeedableRng as _, rngs::StdRng};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    error::AvatarError,
+    model::Subject,
+    samples::CanonicalSamples,
+    skinning::{
+        ClosestBodyPoint, ClosestBodyPointConfig, SkinnedPoint, Skinning, Warp, transform_normal,
+    },
+};
+
+/// Which points are taken from a frame, and which of them are believed.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct CanonicaliseConfig {
+    /// Surface points a frame gives at most (MetaAvatar: 5000).
+    pub points: usize,
+    /// Empty points a frame gives at most, half in front of the surface and half beside it.
+    pub free_points: usize,
+    /// Points farther from the posed minimal body belong to something else: loose clothes stay within.
+    pub max_distance_to_body_m: f32,
+    /// Points that inverse and forward skinning do not bring back to within this are dropped.
+    pub max_return_m: f32,
+    /// Corrections of a canonical point by forward skinning: each makes driving reproduce it better.
+    pub refine_steps: usize,
+    /// Grazing rays see little and err much: no say below this cosine of ray and normal.
+    pub min_view_cosine: f32,
+    /// Depth noise that still gives full weight; the weight falls with the square beyond.
+    pub full_weight_sigma_m: f32,
+    /// Empty points lie between these distances in front of the observed surface.
+    pub free_in_front_m: [f32; 2],
+    /// Empty points are kept this near the body, where canonical space is unambiguous.
+    pub max_free_distance_to_body_m: f32,
+    /// Background pixels between these distances from the person's outline give empty points: farther than
+    /// the mask can err, nearer than clothes can matter.
+    pub beside_outline_px: [u32; 2],
+    pub skinning: ClosestBodyPointConfig,
+    pub seed: u64,
+}
+
+impl Default for CanonicaliseConfig {
+    fn default() -> Self {
+        Self {
+            points: 5000,
+            free_points: 2500,
+            max_distance_to_body_m: 0.10,
+            max_return_m: 0.02,
+            refine_steps: 3,
+            min_view_cosine: 0.15,
+            full_weight_sigma_m: 0.003,
+            free_in_front_m: [0.02, 0.15],
+            max_free_distance_to_body_m: 0.06,
+            beside_outline_px: [3, 14],
+            skinning: ClosestBodyPointConfig::default(),
+            seed: 0,
+        }
+    }
+}
+
+/// What became of a frame's points.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct CanonicaliseCounts {
+    pub observed: usize,
+    pub kept: usize,
+    pub far_from_body: usize,
+    pub not_returned: usize,
+    pub outside_box: usize,
+    pub free: usize,
+}
+
+/// Canonicalises frames of one person.
+pub struct Canonicaliser {
+    model: Arc<BodyModel>,
+    subject: Subject,
+    skinning: Arc<dyn Skinning>,
+    config: CanonicaliseConfig,
+}
+
+/// Points in world space with what is known of them.
+#[derive(Default)]
+struct Observed {
+    points: Vec<Vec3>,
+    normals: Vec<Vec3>,
+    weights: Vec<f32>,
+}
+
+/// A posed point's canonical place.
+struct Returned {
+    canonical: Vec3,
+    normal: Vec3,
+    distance_to_body_m: f32,
+    /// How far the canonical point lands from the posed one when posed again.
+    miss_m: f32,
+}
+
+impl Canonicaliser {
+    /// With skinning by the closest body point.
+    pub fn new(
+        model: Arc<BodyModel>,
+        betas: &[f32; 10],
+        config: CanonicaliseConfig,
+    ) -> Result<Self, AvatarError> {
+        let skinning = ClosestBodyPoint::new(Arc::clone(&model), betas, config.skinning.clone());
+        Self::with_skinning(model, betas, Arc::new(skinning), config)
+    }
+
+    pub fn with_skinning(
+        model: Arc<BodyModel>,
+        betas: &[f32; 10],
+        skinning: Arc<dyn Skinning>,
+        config: CanonicaliseConfig,
+    ) -> Result<Self, AvatarError> {
+        let subject = Subject::new(&model, betas)?;
+        Ok(Self { model, subject, skinning, config })
+    }
+
+    pub fn subject(&self) -> &Subject {
+        &self.subject
+    }
+
+    pub fn skinning(&self) -> &Arc<dyn Skinning> {
+        &self.skinning
+    }
+
+    /// The frame's samples, if a body was tracked in it. The shape is this person's, whatever the frame's
+    /// `betas` say.
+    pub fn process(
+        &self,
+        frame: &RegisteredFrame,
+    ) -> Option<(CanonicalSamples, CanonicaliseCounts)> {
+        let params = BodyParams { betas: self.subject.betas, ..*frame.params()? };
+        let posed = self.model.pose(&params);
+        let warp = Warp::new(&params, &self.subject.rest_joints);
+        let mut rng = StdRng::seed_from_u64(self.config.seed ^ frame.id().0.rotate_left(32));
+
+        let seen = self.observed(frame);
+        let mut counts = CanonicaliseCounts { observed: seen.points.len(), ..Default::default() };
+        // Twice as many as wanted are skinned, since some will be dropped.
+        let seen = seen.pick(2 * self.config.points, &mut rng);
+        let (points_in_unit, normals, weights) = self.surface(&seen, &posed, &warp, &mut counts);
+
+        let free = free_space::points_in_world(frame, &self.config, &mut rng);
+        let free_in_unit = self.free(&free, &posed, &warp);
+        counts.free = free_in_unit.len();
+        let samples = CanonicalSamples {
+            theta: params.theta,
+            pose: self.subject.pose_input(&params.theta),
+            points_in_unit,
+            normals,
+            weights,
+            free_in_unit,
+        };
+        Some((samples, counts))
+    }
+
+    /// The person's pixels as world points.
+    fn observed(&self, frame: &RegisteredFrame) -> Observed {
+        let clean: &CleanFrame = &frame.clean;
+        let mut observed = Observed::default();
+        for pixel in (0..clean.person.len()).filter(|&pixel| clean.person[pixel]) {
+            let point = clean.vertices.points[pixel];
+            if !point.is_finite() {
+                continue;
+            }
+            let normal = Some(clean.normals.normals[pixel])
+                .filter(|normal| normal.is_finite())
+                .unwrap_or(Vec3::ZERO);
+            observed.points.push(frame.world_from_camera * point);
+            observed
+                .normals
+                .push(frame.world_from_camera.rotate(normal));
+            observed
+                .weights
+                .push(self.weight(point, normal, clean.sigma_m[pixel]));
+        }
+        observed
+    }
+
+    /// Say by sensor noise and by how squarely the ray meets the surface; points without a normal are
+    /// edges and holes, and get the say of a slanted one.
+    fn weight(&self, point: Vec3, normal: Vec3, sigma_m: f32) -> f32 {
+        const WITHOUT_NORMAL: f32 = 0.3;
+        /// From this cosine on, the view is as good as square.
+        const SQUARE: f32 = 0.6;
+        let by_sigma = (self.config.full_weight_sigma_m / sigma_m.max(1e-6))
+            .powi(2)
+            .min(1.0);
+        let by_angle = if normal == Vec3::ZERO {
+            WITHOUT_NORMAL
+        } else {
+            let cosine = -normal.dot(point.normalize_or_zero());
+            let grazing = self.config.min_view_cosine;
+            ((cosine - grazing) / (SQUARE - grazing).max(1e-3)).clamp(0.0, 1.0)
+        };
+        if by_sigma.is_finite() {
+            by_sigma * by_angle
+        } else {
+            0.0
+        }
+    }
+
+    /// Unit-space points, normals and weights of what passes all tests.
+    fn surface(
+        &self,
+        seen: &Observed,
+        posed: &PosedBody,
+        warp: &Warp,
+        counts: &mut CanonicaliseCounts,
+    ) -> (Vec<Vec3>, Vec<Vec3>, Vec<f32>) {
+        let returned = self.canonicalise(&seen.points, &seen.normals, posed, warp);
+        let (mut points, mut normals, mut weights) = (Vec::new(), Vec::new(), Vec::new());
+        for (point, &weight) in returned.iter().zip(&seen.weights) {
+            let in_unit = self.subject.unit_box.unit_from_canonical(point.canonical);
+            if point.distance_to_body_m > self.config.max_distance_to_body_m {
+                counts.far_from_body += 1;
+            } else if !(point.miss_m <= self.config.max_return_m) {
+                counts.not_returned += 1;
+            } else if !in_unit_box(in_unit) {
+                counts.outside_box += 1;
+            } else if points.len() < self.config.points {
+                points.push(in_unit);
+                normals.push(point.normal);
+                weights.push(weight);
+            }
+        }
+        counts.kept = points.len();
+        (points, normals, weights)
+    }
+
+    /// Unit-space places of empty points near the body.
+    fn free(&self, points: &[Vec3], posed: &PosedBody, warp: &Warp) -> Vec<Vec3> {
+        /// Empty points must return well: a wrong one would carve the body.
+        const MAX_MISS_M: f32 = 0.005;
+        self.canonicalise(points, &[], posed, warp)
+            .iter()
+            .filter(|point| {
+                point.distance_to_body_m <= self.config.max_free_distance_to_body_m
+                    && point.miss_m <= MAX_MISS_M
+            })
+            .map(|point| self.subject.unit_box.unit_from_canonical(point.canonical))
+            .filter(|&point| in_unit_box(point))
+            .take(self.config.free_points)
+            .collect()
+    }
+
+    /// Inverse skinning, then rounds of forward skinning: `x_star = W(w(x_star))^-1 x_posed`.
+    fn canonicalise(
+        &self,
+        points: &[Vec3],
+        normals: &[Vec3],
+        posed: &PosedBody,
+        warp: &Warp,
+    ) -> Vec<Returned> {
+        let mut skinned = self.skinning.inverse(posed, points, normals);
+        let distances: Vec<f32> = skinned
+            .iter()
+            .map(|point| point.distance_to_body_m)
+            .collect();
+        let mut placed = place(points, normals, &skinned, warp);
+        for round in 0..=self.config.refine_steps {
+            let (canonical, canonical_normals): (Vec<Vec3>, Vec<Vec3>) =
+                placed.iter().copied().unzip();
+            let normals_known = if normals.is_empty() {
+                &[]
+            } else {
+                &canonical_normals[..]
+            };
+            skinned = self.skinning.forward(&canonical, normals_known);
+            if round < self.config.refine_steps {
+                placed = place(points, normals, &skinned, warp);
+            }
+        }
+        (0..points.len())
+            .map(|index| {
+                let (canonical, normal) = placed[index];
+                let back = warp
+                    .posed_from_canonical(&skinned[index].weights)
+                    .transform_point3(canonical);
+                Returned {
+                    canonical,
+                    normal,
+                    distance_to_body_m: distances[index].max(skinned[index].distance_to_body_m),
+                    miss_m: back.distance(points[index]),
+                }
+            })
+            .collect()
+    }
+}
+
+impl Observed {
+    /// At most `count` of the points, evenly by chance, in random order.
+    fn pick(mut self, count: usize, rng: &mut StdRng) -> Self {
+        let total = self.points.len();
+        let count = count.min(total);
+        for index in 0..count {
+            let other = rng.random_range(index..total);
+            self.points.swap(index, other);
+            self.normals.swap(index, other);
+            self.weights.swap(index, other);
+        }
+        self.points.truncate(count);
+        self.normals.truncate(count);
+        self.weights.truncate(count);
+        self
+    }
+}
+
+/// Canonical points and normals, by these weights.
+fn place(
+    points: &[Vec3],
+    normals: &[Vec3],
+    skinned: &[SkinnedPoint],
+    warp: &Warp,
+) -> Vec<(Vec3, Vec3)> {
+    points
+        .par_iter()
+        .enumerate()
+        .with_min_len(256)
+        .map(|(index, &point)| {
+            let weights = &skinned[index].weights;
+            let normal = normals.get(index).map_or(Vec3::ZERO, |&normal| {
+                transform_normal(&warp.posed_from_canonical(weights).matrix3, normal)
+            });
+            (
+                warp.canonical_from_posed(weights).transform_point3(point),
+                normal,
+            )
+        })
+        .collect()
+}
+
+fn in_unit_box(point: Vec3) -> bool {
+    // Also false for NaN.
+    point.abs().max_element() <= 1.0
+}
+
+#[cfg(test)]
+mod tests;

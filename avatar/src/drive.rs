@@ -1,0 +1,173 @@
+//! The live avatar: a mesh of fixed topology that follows the field and the body from pose to pose.
+
+use std::sync::Arc;
+
+use effigy_capture::FrameId;
+use effigy_fusion::{TriangleMesh, mesh::normals::vertex_normals_into};
+use effigy_registration::{BodyParams, smpl::JOINT_COUNT};
+use glam::{Affine3A, Vec3};
+use serde::{Deserialize, Serialize};
+
+use crate::{mesher::FieldAt, model::Avatar, sdf::SignedDistanceField, skinning::Warp};
+
+/// How vertices find the zero level of a new pose.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum Projection {
+    /// Along each vertex's own canonical normal; a step costs one field value.
+    AlongNormals { steps: usize },
+    /// Newton steps along the field's gradient; a step costs twice that, and triangles may drift.
+    AlongGradients { steps: usize },
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct DriveConfig {
+    pub projection: Projection,
+    /// No vertex leaves its place in the topology by more: clothes on a body move by centimetres.
+    pub max_offset_m: f32,
+}
+
+impl Default for DriveConfig {
+    fn default() -> Self {
+        Self { projection: Projection::AlongNormals { steps: 2 }, max_offset_m: 0.05 }
+    }
+}
+
+/// The avatar in one pose.
+#[derive(Clone, Debug)]
+pub struct AvatarMesh {
+    /// The frame whose pose this is.
+    pub frame: FrameId,
+    pub theta: [Vec3; JOINT_COUNT],
+    /// Vertices in canonical space (star pose, metres).
+    pub canonical: Vec<Vec3>,
+    /// Vertices in the space of the pose's `trans`: world.
+    pub vertices: Vec<Vec3>,
+    /// Outward unit normals of the posed mesh.
+    pub normals: Vec<Vec3>,
+    pub triangles: Arc<Vec<[u32; 3]>>,
+}
+
+impl AvatarMesh {
+    /// The posed mesh on its own.
+    pub fn to_mesh(&self) -> TriangleMesh {
+        TriangleMesh {
+            vertices: self.vertices.clone(),
+            normals: self.normals.clone(),
+            triangles: self.triangles.to_vec(),
+            colors: Vec::new(),
+        }
+    }
+}
+
+/// Poses one avatar, frame by frame; no frame depends on the one before.
+pub struct Driver {
+    avatar: Arc<Avatar>,
+    config: DriveConfig,
+    /// For each vertex, rest (zero pose) from canonical space.
+    rest_from_canonical: Vec<Affine3A>,
+    /// How fast the field grows along each topology normal.
+    slopes: Vec<f32>,
+    offsets: Vec<f32>,
+    points: Vec<Vec3>,
+    field_at: FieldAt,
+}
+
+/// A field flatter than this along a normal is no distance field there; steps stay bounded.
+const MIN_SLOPE: f32 = 0.3;
+
+impl Driver {
+    pub fn new(avatar: Arc<Avatar>, config: DriveConfig) -> Self {
+        let count = avatar.topology.vertices_in_unit.len();
+        let mut field_at = FieldAt::new(count);
+        let sdf = avatar
+            .field
+            .field(&avatar.subject.pose_input(&avatar.topology_theta));
+        let slopes = field_at
+            .gradients(&*sdf, &avatar.topology.vertices_in_unit)
+            .iter()
+            .zip(&avatar.topology.normals)
+            .map(|(gradient, normal)| gradient.dot(*normal).max(MIN_SLOPE))
+            .collect();
+        Self {
+            rest_from_canonical: avatar.rest_from_canonical(),
+            slopes,
+            offsets: vec![0.0; count],
+            points: Vec::with_capacity(count),
+            field_at,
+            avatar,
+            config,
+        }
+    }
+
+    pub fn avatar(&self) -> &Arc<Avatar> {
+        &self.avatar
+    }
+
+    /// The avatar in the pose of `params`; the shape is the avatar's own, whatever `params.betas` say.
+    pub fn pose(&mut self, params: &BodyParams, frame: FrameId) -> AvatarMesh {
+        let sdf = self
+            .avatar
+            .field
+            .field(&self.avatar.subject.pose_input(&params.theta));
+        self.project(&*sdf);
+        let unit_box = self.avatar.subject.unit_box;
+        let canonical: Vec<Vec3> = self
+            .points
+            .iter()
+            .map(|&point| unit_box.canonical_from_unit(point))
+            .collect();
+        let vertices = self.skin(params, &canonical);
+        let triangles = Arc::clone(&self.avatar.topology.triangles);
+        let mut normals = Vec::new();
+        vertex_normals_into(&vertices, &triangles, &mut normals);
+        AvatarMesh { frame, theta: params.theta, canonical, vertices, normals, triangles }
+    }
+
+    /// Moves the topology's vertices onto the zero level of this field; the result is in `self.points`.
+    fn project(&mut self, sdf: &dyn SignedDistanceField) {
+        let longest = self.config.max_offset_m / self.avatar.subject.unit_box.metres_per_unit();
+        self.points
+            .clone_from(&self.avatar.topology.vertices_in_unit);
+        match self.config.projection {
+            Projection::AlongNormals { steps } => self.project_along_normals(sdf, steps, longest),
+            Projection::AlongGradients { steps } => {
+                for _ in 0..steps {
+                    self.field_at
+                        .step_onto_surface(sdf, &mut self.points, longest);
+                }
+            }
+        }
+    }
+
+    fn project_along_normals(&mut self, sdf: &dyn SignedDistanceField, steps: usize, longest: f32) {
+        let topology = &self.avatar.topology;
+        self.offsets.fill(0.0);
+        for _ in 0..steps {
+            let values = self.field_at.values(sdf, &self.points);
+            for (vertex, &value) in values.iter().enumerate() {
+                if value.is_finite() {
+                    let offset = self.offsets[vertex] - value / self.slopes[vertex];
+                    self.offsets[vertex] = offset.clamp(-longest, longest);
+                }
+                self.points[vertex] = topology.vertices_in_unit[vertex]
+                    + topology.normals[vertex] * self.offsets[vertex];
+            }
+        }
+    }
+
+    fn skin(&self, params: &BodyParams, canonical: &[Vec3]) -> Vec<Vec3> {
+        let warp = Warp::new(params, &self.avatar.subject.rest_joints);
+        canonical
+            .iter()
+            .zip(&self.rest_from_canonical)
+            .zip(&self.avatar.topology.skinning)
+            .map(|((&point, rest_from_canonical), weights)| {
+                let at_rest = rest_from_canonical.transform_point3(point);
+                warp.posed_from_rest_by_four(weights)
+                    .transform_point3(at_rest)
+            })
+            .collect()
+    }
+}
