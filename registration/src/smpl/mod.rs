@@ -3,6 +3,8 @@
 //! `rest` space is SMPL's zero pose (y up, facing +z, left = +x, metres). Equations: Loper et al. 2015,
 //! and `docs/spaces.md`.
 
+pub mod builtin;
+mod identity;
 mod joints;
 mod lbs;
 mod model;
