@@ -47,13 +47,18 @@ impl BodyModel {
 
     /// Adds `P r` with `r = vec(R_j - I)` to zero-pose vertices; the root does not take part.
     pub fn add_pose_correctives(&self, vertices: &mut [Vec3], theta: &[Vec3; JOINT_COUNT]) {
+        self.add_rotation_correctives(vertices, &theta.map(rotation_from_axis_angle));
+    }
+
+    /// As [`Self::add_pose_correctives`], from rotation matrices relative to the parents.
+    pub fn add_rotation_correctives(&self, vertices: &mut [Vec3], rotations: &[Mat3; JOINT_COUNT]) {
         for joint in 1..JOINT_COUNT {
-            if theta[joint] == Vec3::ZERO {
-                continue;
-            }
-            let rotation = rotation_from_axis_angle(theta[joint]) - Mat3::IDENTITY;
+            let rotation = rotations[joint] - Mat3::IDENTITY;
             for entry in 0..9 {
                 let value = rotation.row(entry / 3)[entry % 3];
+                if value == 0.0 {
+                    continue;
+                }
                 let direction = &self.pose_dirs[(joint - 1) * 9 + entry];
                 for (&vertex, &offset) in direction.vertices.iter().zip(&direction.offsets) {
                     vertices[vertex as usize] += offset * value;
@@ -100,6 +105,19 @@ impl BoneTransforms {
             *bone = *bone * Affine3A::from_translation(-*rest_joint);
         }
         (Self(bones), joints)
+    }
+
+    /// Skins `rest` vertices into `posed` ones.
+    pub fn skin_into(
+        &self,
+        skinning: &[VertexWeights],
+        rest: &[Vec3],
+        trans: Vec3,
+        posed: &mut [Vec3],
+    ) {
+        for ((out, vertex), weights) in posed.iter_mut().zip(rest).zip(skinning) {
+            *out = self.blend(weights).transform_point3(*vertex) + trans;
+        }
     }
 
     /// The weighted sum of bone transforms for one vertex.

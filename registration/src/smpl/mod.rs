@@ -5,18 +5,24 @@
 
 pub mod builtin;
 mod identity;
+mod jacobian;
 mod joints;
 mod lbs;
+pub mod mirror;
 mod model;
 mod params;
+mod parts;
+mod poser;
 mod rodrigues;
 mod star_pose;
 mod unit_box;
 
+pub use jacobian::{PARAMETER_COUNT, PoseJacobian};
 pub use joints::{JOINT_COUNT, JOINT_NAMES, PARENTS};
 pub use lbs::{BoneTransforms, PosedBody};
 pub use model::{BodyIdentity, BodyModel, PoseDirection, SparseRow, VertexWeights};
 pub use params::BodyParams;
+pub use poser::Poser;
 pub use rodrigues::rotation_from_axis_angle;
 pub use star_pose::{STAR_HALF_ANGLE_RAD, star_transforms};
 pub use unit_box::UnitBox;

@@ -58,6 +58,13 @@ impl BodyModel {
     /// `template + shape_dirs * betas`: the minimal body in the zero pose, without pose correctives.
     pub fn shaped_vertices(&self, betas: &[f32; 10]) -> Vec<Vec3> {
         let mut vertices = self.template.clone();
+        self.shape_into(betas, &mut vertices);
+        vertices
+    }
+
+    /// As [`Self::shaped_vertices`], into a buffer of V vertices.
+    pub fn shape_into(&self, betas: &[f32; 10], vertices: &mut [Vec3]) {
+        vertices.copy_from_slice(&self.template);
         for (directions, &beta) in self.shape_dirs.iter().zip(betas) {
             if beta == 0.0 {
                 continue;
@@ -66,19 +73,22 @@ impl BodyModel {
                 *vertex += *direction * beta;
             }
         }
-        vertices
     }
 
     /// The joints of a shaped body in the zero pose.
     pub fn joints(&self, shaped: &[Vec3]) -> [Vec3; JOINT_COUNT] {
-        std::array::from_fn(|joint| {
-            let row = &self.joint_regressor[joint];
-            row.indices
-                .iter()
-                .zip(&row.weights)
-                .map(|(&i, &w)| shaped[i as usize] * w)
-                .sum()
-        })
+        std::array::from_fn(|joint| self.joint_regressor[joint].apply(shaped))
+    }
+}
+
+impl SparseRow {
+    /// The weighted sum of these values.
+    pub fn apply(&self, values: &[Vec3]) -> Vec3 {
+        self.indices
+            .iter()
+            .zip(&self.weights)
+            .map(|(&i, &w)| values[i as usize] * w)
+            .sum()
     }
 }
 

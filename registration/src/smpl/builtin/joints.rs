@@ -3,7 +3,7 @@
 use glam::{Vec3, vec3};
 
 use super::cage::SOLES_Y_M;
-use crate::smpl::{JOINT_COUNT, SparseRow};
+use crate::smpl::{JOINT_COUNT, SparseRow, mirror::MIRROR_JOINT};
 
 /// Vertices within this distance of a joint's nearest ones take part in its row.
 const ROW_SIZE: usize = 48;
@@ -16,11 +16,6 @@ const CENTRES_MM: [(usize, [i16; 3]); 15] = [
     (7, [93, 88, -28]), (9, [0, 1278, 20]), (10, [103, 30, 95]), (12, [0, 1499, -15]), (13, [82, 1405, -8]),
     (15, [0, 1566, 33]), (16, [178, 1437, -18]), (18, [444, 1440, -38]), (20, [705, 1447, -45]),
     (22, [790, 1437, -55]),
-];
-
-/// For each joint the one on the other side.
-pub(crate) const MIRROR_JOINT: [usize; JOINT_COUNT] = [
-    0, 2, 1, 3, 5, 4, 6, 8, 7, 9, 11, 10, 12, 14, 13, 15, 17, 16, 19, 18, 21, 20, 23, 22,
 ];
 
 /// Joint centres of the template, in rest space.

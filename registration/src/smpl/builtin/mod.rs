@@ -26,6 +26,11 @@ pub fn body() -> Arc<BodyModel> {
     Arc::clone(BODY.get_or_init(|| Arc::new(make())))
 }
 
+/// For each vertex the one on the other side.
+pub(super) fn mirror_map() -> Vec<u32> {
+    surface().mirror
+}
+
 fn make() -> BodyModel {
     let surface = surface();
     let template = template(&surface);

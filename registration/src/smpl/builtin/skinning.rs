@@ -2,8 +2,8 @@
 
 use glam::Vec3;
 
-use super::{joints::MIRROR_JOINT, subdivide::PolygonSurface};
-use crate::smpl::{JOINT_COUNT, VertexWeights};
+use super::subdivide::PolygonSurface;
+use crate::smpl::{JOINT_COUNT, VertexWeights, mirror::MIRROR_JOINT};
 
 /// Weights are multiples of this, so that rounding differences between machines vanish.
 const WEIGHT_STEPS: f32 = 65535.0;
