@@ -2,7 +2,11 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::camera::{CameraModel, Rigid3};
+use crate::{
+    camera::{CameraModel, Distortion, Intrinsics, Rigid3},
+    codec::MAX_PIXELS,
+    error::CaptureError,
+};
 
 /// Everything that stays the same from frame to frame of one source.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -21,6 +25,98 @@ pub struct Calibration {
     pub world_from_camera: Option<Rigid3>,
 }
 
+impl Calibration {
+    /// Refuses what no camera can be: sizes, focal lengths, ranges and rates that are not finite and positive.
+    pub fn check(&self) -> Result<(), CaptureError> {
+        check_camera(&self.depth, "depth camera")?;
+        if let Some(color) = &self.color {
+            check_camera(color, "colour camera")?;
+        }
+        check(
+            positive(self.metres_per_unit),
+            "metres_per_unit",
+            self.metres_per_unit,
+            "a positive length",
+        )?;
+        let [near, far] = self.range_m;
+        let ordered = near.is_finite() && far.is_finite() && 0.0 <= near && near < far;
+        check(ordered, "range_m", self.range_m, "0 <= near < far")?;
+        check(
+            positive(self.rate_hz),
+            "rate_hz",
+            self.rate_hz,
+            "a positive rate",
+        )?;
+        check_rigid(self.color_from_depth, "color_from_depth")?;
+        check_rigid(
+            self.world_from_camera.unwrap_or_default(),
+            "world_from_camera",
+        )?;
+        check(
+            self.sensor.is_valid(),
+            "sensor",
+            self.sensor,
+            "figures of noise >= 0, lengths positive",
+        )
+    }
+}
+
+fn check_camera(camera: &CameraModel, field: &'static str) -> Result<(), CaptureError> {
+    let Intrinsics { width, height, fx, fy, cx, cy } = camera.intrinsics;
+    let pixels = u64::from(width) * u64::from(height);
+    check(
+        (1..=MAX_PIXELS).contains(&pixels),
+        field,
+        [width, height],
+        "between 1 pixel and 16 megapixels",
+    )?;
+    let pinhole = positive(fx) && positive(fy) && cx.is_finite() && cy.is_finite();
+    check(
+        pinhole,
+        field,
+        camera.intrinsics,
+        "positive fx and fy, finite cx and cy",
+    )?;
+    let coefficients: &[f32] = match &camera.distortion {
+        Distortion::None => &[],
+        Distortion::BrownConrady(k) => k,
+        Distortion::KannalaBrandt(k) => k,
+    };
+    check(
+        coefficients.iter().all(|k| k.is_finite()),
+        field,
+        camera.distortion,
+        "finite coefficients",
+    )
+}
+
+fn check_rigid(transform: Rigid3, field: &'static str) -> Result<(), CaptureError> {
+    // f32 products of a few rotations stay within 1e-5 of unit length.
+    let unit = (transform.rotation.length() - 1.0).abs() < 1e-3;
+    check(
+        unit && transform.translation.is_finite(),
+        field,
+        transform,
+        "a unit quaternion and a finite translation",
+    )
+}
+
+fn check(
+    holds: bool,
+    field: &'static str,
+    found: impl std::fmt::Debug,
+    expected: &'static str,
+) -> Result<(), CaptureError> {
+    if holds {
+        return Ok(());
+    }
+    Err(CaptureError::BadCalibration { field, found: format!("{found:?}"), expected })
+}
+
+fn positive(value: f32) -> bool {
+    value.is_finite() && value > 0.0
+}
+
 /// How a sensor errs; from it comes the sigma of each pixel. Sources: `docs/sensors.md`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
@@ -34,12 +130,22 @@ pub enum SensorModel {
 }
 
 impl SensorModel {
+    fn is_valid(self) -> bool {
+        match self {
+            Self::Stereo { baseline_m, focal_px, subpixel_rms_px } => {
+                positive(baseline_m) && positive(focal_px) && subpixel_rms_px >= 0.0
+            }
+            Self::StructuredLight => true,
+            Self::TimeOfFlight { floor_m, slope } => floor_m >= 0.0 && slope.is_finite(),
+        }
+    }
+
     /// Standard deviation of depth in metres at a depth and an angle between ray and surface normal.
-    pub fn sigma_m(&self, depth_m: f32, incidence_rad: f32) -> f32 {
+    pub fn sigma_m(self, depth_m: f32, incidence_rad: f32) -> f32 {
         // The angle enters as in Nguyen et al.: theta^2 / (pi/2 - theta)^2, kept finite at grazing rays.
         let theta = incidence_rad.clamp(0.0, 1.4);
         let grazing = (theta / (std::f32::consts::FRAC_PI_2 - theta)).powi(2);
-        match *self {
+        match self {
             Self::Stereo { baseline_m, focal_px, subpixel_rms_px } => {
                 depth_m * depth_m * subpixel_rms_px / (focal_px * baseline_m)
                     * (1.0 + 0.05 * grazing)

@@ -5,9 +5,11 @@
 
 pub mod calibration;
 pub mod camera;
+mod codec;
 pub mod error;
 pub mod frame;
 pub mod image;
+pub mod recording;
 pub mod source;
 pub mod time;
 

@@ -1,6 +1,8 @@
 //! Where frames come from.
 
-use crate::{calibration::Calibration, error::CaptureError, frame::Frame};
+use std::path::Path;
+
+use crate::{calibration::Calibration, error::CaptureError, frame::Frame, recording::Player};
 
 /// A sensor, a recording or a simulator.
 pub trait FrameSource: Send {
@@ -16,4 +18,9 @@ pub trait FrameSource: Send {
     fn frame_count(&self) -> Option<u64> {
         None
     }
+}
+
+/// Opens a recording.
+pub fn open(path: &Path) -> Result<Box<dyn FrameSource>, CaptureError> {
+    Ok(Box::new(Player::open(path)?))
 }

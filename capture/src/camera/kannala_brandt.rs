@@ -5,7 +5,7 @@ use glam::{Vec2, Vec3};
 use super::newton;
 
 /// Where a point in camera space falls on the distorted normalised plane.
-pub(super) fn project(k: &[f32; 4], point: Vec3) -> Vec2 {
+pub(super) fn project(k: [f32; 4], point: Vec3) -> Vec2 {
     let across = point.truncate();
     let radius = across.length();
     // Near the axis atan(r / z) / r tends to 1 / z.
@@ -16,7 +16,7 @@ pub(super) fn project(k: &[f32; 4], point: Vec3) -> Vec2 {
 }
 
 /// The point on the normalised plane whose ray falls on `distorted`; NaN if it is not in front.
-pub(super) fn undistort(k: &[f32; 4], distorted: Vec2) -> Vec2 {
+pub(super) fn undistort(k: [f32; 4], distorted: Vec2) -> Vec2 {
     let bent = distorted.length();
     if bent < 1e-9 {
         return distorted;
@@ -29,7 +29,7 @@ pub(super) fn undistort(k: &[f32; 4], distorted: Vec2) -> Vec2 {
 }
 
 /// `theta (1 + k1 theta^2 + ... + k4 theta^8)` and its derivative.
-fn bend(&[k1, k2, k3, k4]: &[f32; 4], theta: f32) -> (f32, f32) {
+fn bend([k1, k2, k3, k4]: [f32; 4], theta: f32) -> (f32, f32) {
     let t = theta * theta;
     let value = theta * (1.0 + t * (k1 + t * (k2 + t * (k3 + t * k4))));
     let slope = 1.0 + t * (3.0 * k1 + t * (5.0 * k2 + t * (7.0 * k3 + t * 9.0 * k4)));

@@ -28,7 +28,7 @@ impl CameraModel {
         let on_plane = match &self.distortion {
             Distortion::None => point.truncate() / point.z,
             Distortion::BrownConrady(k) => brown_conrady::distort(k, point.truncate() / point.z),
-            Distortion::KannalaBrandt(k) => kannala_brandt::project(k, point),
+            Distortion::KannalaBrandt(k) => kannala_brandt::project(*k, point),
         };
         let Intrinsics { fx, fy, cx, cy, .. } = self.intrinsics;
         vec2(fx * on_plane.x + cx, fy * on_plane.y + cy)
@@ -46,7 +46,7 @@ impl CameraModel {
         match &self.distortion {
             Distortion::None => on_plane,
             Distortion::BrownConrady(k) => brown_conrady::undistort(k, on_plane),
-            Distortion::KannalaBrandt(k) => kannala_brandt::undistort(k, on_plane),
+            Distortion::KannalaBrandt(k) => kannala_brandt::undistort(*k, on_plane),
         }
     }
 
