@@ -1,1 +1,24 @@
 //! A simulated depth camera with a clothed, moving person in front of it, and the truth beside it.
+//!
+//! In: a [`Scenario`] and a body model. Out: [`effigy_capture::Frame`]s through [`SimulatedSensor`], and
+//! [`GroundTruth`] for each of them. World space: y up, floor at y = 0, metres; the person stands at the
+//! origin and the camera looks along -z. Everything follows from the scenario's seed, bit for bit.
+
+pub mod error;
+pub mod noise;
+pub mod person;
+pub mod population;
+pub mod preset;
+mod random;
+pub mod render;
+pub mod scenario;
+mod scene;
+pub mod sensor;
+pub mod truth;
+
+pub use error::SimError;
+pub use person::{Outfit, OutfitKind, Person};
+pub use preset::SensorPreset;
+pub use scenario::{MotionChoice, Noise, Room, Scenario};
+pub use sensor::SimulatedSensor;
+pub use truth::{GroundTruth, Truth};

@@ -78,9 +78,7 @@ impl Cage {
         for figures in [
             &f::NECK,
             &f::JAW,
-            &f::CHIN,
             &f::MOUTH,
-            &f::LIP,
             &f::NOSE,
             &f::EYES,
             &f::BROW,
@@ -147,6 +145,7 @@ impl Cage {
             &f::ABOVE_KNEE,
             &f::BELOW_KNEE,
             &f::CALF,
+            &f::SHIN,
             &f::ANKLE,
         ];
         rings.into_iter().fold(hole.to_vec(), |above, figures| {

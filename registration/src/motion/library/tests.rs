@@ -1,0 +1,1 @@
+//! What the movements claim: whole turns, joint limits, feet on the floor.

@@ -1,0 +1,139 @@
+//! Simulated people: a shape, an outfit on the body's own topology, and how both look in a pose.
+//!
+//! Clothes are displacements of the zero-pose surface: outwards by an ease, more where gravity pulls the cloth
+//! away from the limb, in folds where joints bend. A cloth simulation may later take the place of
+//! [`Person::clothed_zero_pose`]; nothing else depends on how the surface came about.
+
+use std::sync::Arc;
+
+use effigy_fusion::mesh::TriangleMesh;
+use effigy_registration::{
+    BodyModel, BodyParams,
+    motion::RestBody,
+    smpl::{BoneTransforms, JOINT_COUNT, star_transforms},
+};
+use glam::{Mat3, Vec3};
+
+mod chart;
+mod folds;
+mod identity;
+mod outfit;
+mod paint;
+mod tailor;
+
+pub use identity::sample_betas;
+pub use outfit::{Garment, Outfit, OutfitKind, Shoes};
+pub use paint::Paint;
+
+use chart::Chart;
+use tailor::Tailoring;
+
+/// One person in one outfit.
+#[derive(Clone, Debug)]
+pub struct Person {
+    pub body: Arc<BodyModel>,
+    pub betas: [f32; 10],
+    /// Joints of the minimal body in the zero pose.
+    pub rest_joints: [Vec3; JOINT_COUNT],
+    pub outfit: Outfit,
+    /// Colours and infrared reflectance, for each vertex.
+    pub paint: Paint,
+    minimal: Vec<Vec3>,
+    tailoring: Tailoring,
+}
+
+impl Person {
+    /// Somebody with these betas in this outfit; the seed decides on folds, hair and colours.
+    pub fn new(body: Arc<BodyModel>, betas: [f32; 10], outfit: Outfit, seed: u64) -> Self {
+        let minimal = body.shaped_vertices(&betas);
+        let rest_joints = body.joints(&minimal);
+        let chart = Chart::new(&body, minimal.clone(), rest_joints);
+        let tailoring = Tailoring::new(&chart, &outfit, seed);
+        let paint = Paint::new(&chart, &tailoring, seed);
+        Self { body, betas, rest_joints, outfit, paint, minimal, tailoring }
+    }
+
+    /// Somebody from the population, 1.50 to 1.95 m tall.
+    pub fn sample(body: Arc<BodyModel>, kind: OutfitKind, seed: u64) -> Self {
+        let betas = sample_betas(&body, seed);
+        Self::new(body, betas, Outfit::new(kind, seed), seed)
+    }
+
+    /// The minimal body in the zero pose with the pose's correctives.
+    pub fn minimal_zero_pose(&self, theta: &[Vec3; JOINT_COUNT]) -> Vec<Vec3> {
+        let mut vertices = self.minimal.clone();
+        self.body.add_pose_correctives(&mut vertices, theta);
+        vertices
+    }
+
+    /// The outer surface in the zero pose, with correctives, folds and sag of the pose.
+    pub fn clothed_zero_pose(&self, theta: &[Vec3; JOINT_COUNT]) -> Vec<Vec3> {
+        let mut vertices = self.minimal_zero_pose(theta);
+        self.tailoring
+            .dress(&mut vertices, theta, &self.rest_joints, &self.body.skinning);
+        vertices
+    }
+
+    /// The outer surface of a pose, moved to star pose.
+    pub fn clothed_canonical(&self, theta: &[Vec3; JOINT_COUNT]) -> Vec<Vec3> {
+        self.skinned(
+            self.clothed_zero_pose(theta),
+            &star_transforms(&self.rest_joints),
+            Vec3::ZERO,
+        )
+    }
+
+    /// The minimal body of a pose (correctives included), moved to star pose.
+    pub fn minimal_canonical(&self, theta: &[Vec3; JOINT_COUNT]) -> Vec<Vec3> {
+        self.skinned(
+            self.minimal_zero_pose(theta),
+            &star_transforms(&self.rest_joints),
+            Vec3::ZERO,
+        )
+    }
+
+    /// The outer surface in the space of `trans`, with normals and colours.
+    pub fn clothed_posed(&self, theta: &[Vec3; JOINT_COUNT], trans: Vec3) -> TriangleMesh {
+        let (bones, _) = BoneTransforms::from_pose(theta, &self.rest_joints);
+        let vertices = self.skinned(self.clothed_zero_pose(theta), &bones, trans);
+        self.mesh(vertices)
+    }
+
+    /// A surface on the body's topology, with normals from its own geometry and this person's colours.
+    pub fn mesh(&self, vertices: Vec<Vec3>) -> TriangleMesh {
+        let mut mesh = TriangleMesh::new(vertices, self.body.triangles.clone());
+        mesh.compute_normals();
+        mesh.colors.clone_from(&self.paint.colors);
+        mesh
+    }
+
+    /// What a motion needs to know to put these feet (with their shoes) on the floor.
+    pub fn rest_body(&self) -> RestBody {
+        let standing = self.clothed_zero_pose(&[Vec3::ZERO; JOINT_COUNT]);
+        RestBody::with_surface(&self.body, self.rest_joints, &standing)
+    }
+
+    pub fn params(&self, theta: [Vec3; JOINT_COUNT], trans: Vec3) -> BodyParams {
+        BodyParams { betas: self.betas, theta, trans }
+    }
+
+    /// The minimal body's height, standing in the zero pose.
+    pub fn height_m(&self) -> f32 {
+        identity::height_m(&self.minimal)
+    }
+
+    fn skinned(&self, mut vertices: Vec<Vec3>, bones: &BoneTransforms, trans: Vec3) -> Vec<Vec3> {
+        for (vertex, weights) in vertices.iter_mut().zip(&self.body.skinning) {
+            *vertex = bones.blend(weights).transform_point3(*vertex) + trans;
+        }
+        vertices
+    }
+}
+
+/// `R_j - I` for each joint.
+fn bends(theta: &[Vec3; JOINT_COUNT]) -> [Mat3; JOINT_COUNT] {
+    theta.map(|t| effigy_registration::smpl::rotation_from_axis_angle(t) - Mat3::IDENTITY)
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,1 @@
+//! What clothes claim.

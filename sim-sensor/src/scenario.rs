@@ -1,0 +1,171 @@
+//! What is simulated: plain data that a recording carries with it.
+
+use std::path::PathBuf;
+
+use effigy_registration::motion::Routine;
+use serde::{Deserialize, Serialize};
+
+use crate::{error::SimError, person::OutfitKind, preset::SensorPreset};
+
+/// Everything a simulation follows from, to the last bit.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Scenario {
+    pub version: u32,
+    pub seed: u64,
+    pub sensor: SensorPreset,
+    pub motion: MotionChoice,
+    pub outfit: OutfitKind,
+    /// The person's shape; drawn from the seed where none is given.
+    pub betas: Option<[f32; 10]>,
+    pub seconds: f32,
+    /// Frames a second; the sensor's own rate where none is given.
+    pub rate_hz: Option<f32>,
+    pub noise: Noise,
+    pub room: Room,
+    /// Whether frames carry a colour image.
+    pub color: bool,
+    /// Share of frames that never arrive; their numbers are missing in the stream.
+    pub dropped_share: f32,
+}
+
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum MotionChoice {
+    Routine(Routine),
+    /// A BVH file, performed on the spot.
+    Bvh(PathBuf),
+}
+
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Noise {
+    /// As the sensor makes it.
+    #[default]
+    Sensor,
+    /// The truth in the sensor's units.
+    None,
+}
+
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Room {
+    Empty,
+    Floor,
+    #[default]
+    FloorAndWall,
+}
+
+/// The version this program writes and reads.
+pub const SCENARIO_VERSION: u32 = 1;
+const MAX_SECONDS: f32 = 3600.0;
+
+impl Default for Scenario {
+    fn default() -> Self {
+        Self {
+            version: SCENARIO_VERSION,
+            seed: 1,
+            sensor: SensorPreset::Azure,
+            motion: MotionChoice::Routine(Routine::Mixture),
+            outfit: OutfitKind::Demo,
+            betas: None,
+            seconds: 20.0,
+            rate_hz: None,
+            noise: Noise::Sensor,
+            room: Room::FloorAndWall,
+            color: false,
+            dropped_share: 0.0,
+        }
+    }
+}
+
+impl Scenario {
+    pub fn from_json(text: &str) -> Result<Self, SimError> {
+        let scenario: Self = serde_json::from_str(text)
+            .map_err(|source| SimError::Json { expected_version: SCENARIO_VERSION, source })?;
+        scenario.checked()
+    }
+
+    pub fn to_json(&self) -> String {
+        serde_json::to_string(self).expect("plain data always serialises")
+    }
+
+    /// Frames a second.
+    pub fn rate_hz(&self) -> f32 {
+        self.rate_hz
+            .unwrap_or_else(|| self.sensor.calibration().rate_hz)
+    }
+
+    /// Frames from start to end, those that will be dropped included.
+    pub fn frame_slots(&self) -> u64 {
+        (self.seconds * self.rate_hz()).round().max(1.0) as u64
+    }
+
+    /// Refuses what cannot be simulated.
+    pub fn checked(self) -> Result<Self, SimError> {
+        let check = |ok: bool, field, got: String, expected| {
+            if ok {
+                Ok(())
+            } else {
+                Err(SimError::Scenario { field, got, expected })
+            }
+        };
+        let version = self.version == SCENARIO_VERSION;
+        check(
+            version,
+            "version",
+            self.version.to_string(),
+            "1; write it with this program",
+        )?;
+        let seconds = self.seconds > 0.0 && self.seconds <= MAX_SECONDS;
+        check(
+            seconds,
+            "seconds",
+            self.seconds.to_string(),
+            "more than 0 and at most 3600",
+        )?;
+        let rate = (0.5..=240.0).contains(&self.rate_hz());
+        check(rate, "rate_hz", self.rate_hz().to_string(), "0.5 to 240")?;
+        let dropped = (0.0..=0.9).contains(&self.dropped_share);
+        check(
+            dropped,
+            "dropped_share",
+            self.dropped_share.to_string(),
+            "0 to 0.9",
+        )?;
+        let betas = self
+            .betas
+            .is_none_or(|b| b.iter().all(|beta| beta.abs() <= 5.0));
+        check(
+            betas,
+            "betas",
+            format!("{:?}", self.betas),
+            "ten numbers from -5 to 5",
+        )?;
+        Ok(self)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_scenario_survives_json_and_refuses_what_it_does_not_know() {
+        let scenario = Scenario {
+            motion: MotionChoice::Routine(Routine::Squat),
+            betas: Some([0.5; 10]),
+            ..Scenario::default()
+        };
+        assert_eq!(Scenario::from_json(&scenario.to_json()).unwrap(), scenario);
+        let error = Scenario::from_json(r#"{"version":1,"sed":4}"#)
+            .unwrap_err()
+            .to_string();
+        assert!(error.contains("sed"), "names the unknown field: {error}");
+        let error = Scenario::from_json(r#"{"version":9}"#)
+            .unwrap_err()
+            .to_string();
+        assert!(error.contains('9') && error.contains("version"), "{error}");
+        assert!(Scenario::from_json(r#"{"seconds":-1.0}"#).is_err());
+    }
+}

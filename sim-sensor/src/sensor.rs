@@ -1,0 +1,105 @@
+//! The simulated sensor: frames in order, as a real one would deliver them.
+
+use std::sync::Arc;
+
+use effigy_capture::{
+    Calibration, CaptureError, ColorImage, DepthImage, Frame, FrameId, FrameSource,
+};
+use effigy_registration::BodyModel;
+
+use crate::{
+    error::SimError,
+    noise,
+    render::{Renderer, View},
+    scenario::{Noise, Scenario},
+    scene::Scene,
+};
+
+/// A depth camera with a moving person in front of it.
+pub struct SimulatedSensor {
+    scene: Scene,
+    renderer: Renderer,
+    exposure: noise::Exposure,
+    next: u64,
+}
+
+impl SimulatedSensor {
+    pub fn new(scenario: &Scenario, body: Arc<BodyModel>) -> Result<Self, SimError> {
+        let scene = Scene::new(scenario, body)?;
+        let intrinsics = scene.calibration.depth.intrinsics;
+        let renderer = Renderer::new(intrinsics, scene.world_from_camera, scene.scenario.room);
+        let exposure = noise::Exposure::new(&scene.calibration, scene.scenario.sensor.defects());
+        Ok(Self { scene, renderer, exposure, next: 0 })
+    }
+
+    /// What an ideal sensor would see in one frame: true depth, normals, labels, colour.
+    pub fn view(&mut self, frame: FrameId) -> &View {
+        let pose = self.scene.pose(frame);
+        let person = &self.scene.person;
+        let mesh = person.clothed_posed(&pose.theta, pose.trans);
+        self.renderer
+            .render(&mesh, &person.paint, &person.body.skinning)
+    }
+
+    /// One frame by number; frames do not depend on one another.
+    pub fn expose(&mut self, id: FrameId) -> Result<Frame, CaptureError> {
+        let pose = self.scene.pose(id);
+        let person = &self.scene.person;
+        let mesh = person.clothed_posed(&pose.theta, pose.trans);
+        let view = self
+            .renderer
+            .render(&mesh, &person.paint, &person.body.skinning);
+        let raw = match self.scene.scenario.noise {
+            Noise::Sensor => self.exposure.expose(view, self.scene.scenario.seed, id),
+            Noise::None => self.exposure.truth(view),
+        };
+        let (width, height) = (view.width as u32, view.height as u32);
+        let color = if self.scene.scenario.color {
+            Some(Arc::new(ColorImage::new(width, height, view.shaded())?))
+        } else {
+            None
+        };
+        Ok(Frame {
+            id,
+            timestamp: self.scene.timestamp(id),
+            depth: Arc::new(DepthImage::new(width, height, raw)?),
+            color,
+        })
+    }
+
+    pub fn scenario(&self) -> &Scenario {
+        &self.scene.scenario
+    }
+}
+
+impl FrameSource for SimulatedSensor {
+    fn name(&self) -> String {
+        format!("simulated {}", self.scene.scenario.sensor.name())
+    }
+
+    fn calibration(&self) -> &Calibration {
+        &self.scene.calibration
+    }
+
+    fn next_frame(&mut self) -> Result<Option<Frame>, CaptureError> {
+        let slots = self.scene.scenario.frame_slots();
+        while self.next < slots && self.scene.is_dropped(FrameId(self.next)) {
+            self.next += 1;
+        }
+        if self.next >= slots {
+            return Ok(None);
+        }
+        let id = FrameId(self.next);
+        self.next += 1;
+        self.expose(id).map(Some)
+    }
+
+    fn frame_count(&self) -> Option<u64> {
+        let slots = self.scene.scenario.frame_slots();
+        Some(
+            (0..slots)
+                .filter(|&f| !self.scene.is_dropped(FrameId(f)))
+                .count() as u64,
+        )
+    }
+}
