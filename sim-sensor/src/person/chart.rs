@@ -81,8 +81,6 @@ impl Place {
         let out = |joint: usize| (joints[joint + side].x - joints[0].x) * sign;
         let x = (vertex.x - joints[0].x) * sign;
         let y = |joint: usize| joints[joint + side].y;
-        let dominant =
-            (0..JOINT_COUNT).fold(0, |best, b| if shares[b] > shares[best] { b } else { best });
         Self {
             side,
             arm: piecewise(x, [out(16), out(18), out(20)]),

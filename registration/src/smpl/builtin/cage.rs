@@ -78,7 +78,9 @@ impl Cage {
         for figures in [
             &f::NECK,
             &f::JAW,
+            &f::CHIN,
             &f::MOUTH,
+            &f::LIP,
             &f::NOSE,
             &f::EYES,
             &f::BROW,
@@ -145,7 +147,6 @@ impl Cage {
             &f::ABOVE_KNEE,
             &f::BELOW_KNEE,
             &f::CALF,
-            &f::SHIN,
             &f::ANKLE,
         ];
         rings.into_iter().fold(hole.to_vec(), |above, figures| {

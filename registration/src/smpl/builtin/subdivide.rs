@@ -87,9 +87,19 @@ impl PolygonSurface {
             let [a, b] = ends.map(|i| self.mirror[i as usize]);
             first_edge + edges.index[&key(a, b)]
         }));
-        // The cage lists all faces of the left half and then, in the same order, those of the right.
-        let half = self.faces.len() as u32 / 2;
-        mirror.extend((0..2 * half).map(|face| first_face + (face + half) % (2 * half)));
+        let sorted = |face: &[u32]| {
+            let mut face = face.to_vec();
+            face.sort_unstable();
+            face
+        };
+        let numbers: FxHashMap<Vec<u32>, u32> = (first_face..)
+            .zip(&self.faces)
+            .map(|(n, face)| (sorted(face), n))
+            .collect();
+        mirror.extend(self.faces.iter().map(|face| {
+            let other: Vec<u32> = face.iter().map(|&i| self.mirror[i as usize]).collect();
+            numbers[&sorted(&other)]
+        }));
         mirror
     }
 }
