@@ -5,8 +5,10 @@
 //! (star pose, metres) and `unit` space (canonical in [-1, 1]^3).
 
 pub mod canonicalise;
+pub mod checkpoint;
 pub mod drive;
 pub mod error;
+pub mod export;
 pub mod keyframes;
 pub mod mesher;
 pub mod metrics;
@@ -16,6 +18,8 @@ pub mod pose_input;
 pub mod samples;
 pub mod sdf;
 pub mod skinning;
+#[cfg(test)]
+mod testing;
 
 pub use canonicalise::{CanonicaliseConfig, Canonicaliser};
 pub use drive::{AvatarMesh, DriveConfig, Driver};

@@ -1,6 +1,6 @@
 //! Field values on a regular lattice, asked for only where they are needed.
 
-use glam::{Vec3, vec3};
+use glam::{IVec3, Vec3, ivec3};
 
 use crate::sdf::SignedDistanceField;
 
@@ -62,18 +62,27 @@ impl<'a> Lattice<'a> {
         self.evaluated
     }
 
+    /// The place of a point on the lattice, in cells.
+    pub(super) fn coordinates(&self, point: u32) -> IVec3 {
+        let (point, side) = (point as i32, self.side as i32);
+        ivec3(point % side, point / side % side, point / (side * side))
+    }
+
+    pub(super) fn point(&self, coordinates: IVec3) -> u32 {
+        let side = self.side as i32;
+        ((coordinates.z * side + coordinates.y) * side + coordinates.x) as u32
+    }
+
     pub(super) fn value(&self, point: u32) -> f32 {
         self.values[point as usize]
     }
 
-    pub(super) fn position(&self, point: u32) -> Vec3 {
-        let [x, y, z] = self.coordinates(point);
-        let at = |i: usize| (2 * i) as f32 / (self.side - 1) as f32 - 1.0;
-        vec3(at(x), at(y), at(z))
+    fn position(&self, point: u32) -> Vec3 {
+        self.coordinates(point).as_vec3() * (2.0 / (self.side - 1) as f32) - 1.0
     }
 
     /// The eight points of a cell; corner `c` lies at `(c & 1, c >> 1 & 1, c >> 2 & 1)`.
-    pub(super) fn corners(&self, cell: u32) -> [u32; 8] {
+    fn corners(&self, cell: u32) -> [u32; 8] {
         let strides = self.strides();
         std::array::from_fn(|corner| {
             cell + (0..3)
@@ -83,7 +92,7 @@ impl<'a> Lattice<'a> {
     }
 
     /// A bit for each corner whose value is negative.
-    pub(super) fn inside_mask(&self, corners: &[u32; 8]) -> u8 {
+    fn inside_mask(&self, corners: &[u32; 8]) -> u8 {
         corners
             .iter()
             .enumerate()
@@ -95,11 +104,15 @@ impl<'a> Lattice<'a> {
     fn first_cells(&mut self) -> Vec<u32> {
         let last = self.side - 1;
         let stride = last.div_ceil(COARSE_CELLS);
-        let stops: Vec<usize> = (0..last).step_by(stride).chain([last]).collect();
+        let stops: Vec<i32> = (0..last)
+            .step_by(stride)
+            .chain([last])
+            .map(|stop| stop as i32)
+            .collect();
         let mut points = Vec::with_capacity(stops.len().pow(3));
         for &z in &stops {
             for &y in &stops {
-                points.extend(stops.iter().map(|&x| self.point([x, y, z])));
+                points.extend(stops.iter().map(|&x| self.point(ivec3(x, y, z))));
             }
         }
         self.evaluate(points.clone());
@@ -127,8 +140,8 @@ impl<'a> Lattice<'a> {
         let mut edges = Vec::new();
         for &from in points {
             let coordinates = self.coordinates(from);
-            for (axis, &coordinate) in coordinates.iter().enumerate() {
-                let length = stride.min(self.side - 1 - coordinate);
+            for axis in 0..3 {
+                let length = stride.min(self.side - 1 - coordinates[axis] as usize);
                 if length == 0 {
                     continue;
                 }
@@ -149,7 +162,7 @@ impl<'a> Lattice<'a> {
         for axis in 0..3 {
             let stride = self.strides()[axis];
             let mixed = |side: u8| inside & side != 0 && inside & side != side;
-            if mixed(UPPER[axis]) && coordinates[axis] + 2 < self.side {
+            if mixed(UPPER[axis]) && coordinates[axis] + 2 < self.side as i32 {
                 cells.push(cell + stride);
             }
             if mixed(!UPPER[axis]) && coordinates[axis] > 0 {
@@ -177,8 +190,9 @@ impl<'a> Lattice<'a> {
 
     /// Outside for what is no number, and on the cube's wall, where the surface is closed.
     fn stored(&self, point: u32, value: f32) -> f32 {
-        let last = self.side - 1;
-        let on_wall = self.coordinates(point).iter().any(|&c| c == 0 || c == last);
+        let coordinates = self.coordinates(point);
+        let on_wall =
+            coordinates.min_element() == 0 || coordinates.max_element() == self.side as i32 - 1;
         if value.is_nan() {
             1.0
         } else if value == 0.0 || on_wall {
@@ -190,21 +204,10 @@ impl<'a> Lattice<'a> {
 
     /// The cell whose lowest point this is, or the last cell that holds it.
     fn cell_at(&self, point: u32) -> u32 {
-        let last_cell = self.side - 2;
-        self.point(self.coordinates(point).map(|c| c.min(last_cell)))
-    }
-
-    fn point(&self, [x, y, z]: [usize; 3]) -> u32 {
-        ((z * self.side + y) * self.side + x) as u32
-    }
-
-    fn coordinates(&self, point: u32) -> [usize; 3] {
-        let point = point as usize;
-        [
-            point % self.side,
-            point / self.side % self.side,
-            point / (self.side * self.side),
-        ]
+        self.point(
+            self.coordinates(point)
+                .min(IVec3::splat(self.side as i32 - 2)),
+        )
     }
 
     fn strides(&self) -> [u32; 3] {
