@@ -43,8 +43,7 @@ pub struct AvatarHeader {
 }
 
 /// Turns a field's kind and parameters back into a field.
-pub type FieldDecoder<'a> =
-    dyn Fn(&str, &[u8]) -> Result<Arc<dyn PoseField>, AvatarError> + 'a;
+pub type FieldDecoder<'a> = dyn Fn(&str, &[u8]) -> Result<Arc<dyn PoseField>, AvatarError> + 'a;
 
 /// Writes an avatar; an older file of that name is replaced only by a whole new one.
 pub fn write(path: &Path, avatar: &Avatar) -> Result<(), AvatarError> {
@@ -53,7 +52,9 @@ pub fn write(path: &Path, avatar: &Avatar) -> Result<(), AvatarError> {
     let mut unfinished = path.as_os_str().to_owned();
     unfinished.push(".part");
     let mut file = File::create(&unfinished).map_err(io)?;
-    file.write_all(&bytes).and_then(|()| file.sync_all()).map_err(io)?;
+    file.write_all(&bytes)
+        .and_then(|()| file.sync_all())
+        .map_err(io)?;
     fs::rename(&unfinished, path).map_err(io)
 }
 
@@ -132,7 +133,13 @@ fn to_bytes(avatar: &Avatar) -> Result<Vec<u8>, AvatarError> {
     for vector in topology.vertices_in_unit.iter().chain(&topology.normals) {
         bytes.extend(vector.to_array().iter().flat_map(|x| x.to_le_bytes()));
     }
-    bytes.extend(topology.triangles.iter().flatten().flat_map(|index| index.to_le_bytes()));
+    bytes.extend(
+        topology
+            .triangles
+            .iter()
+            .flatten()
+            .flat_map(|index| index.to_le_bytes()),
+    );
     bytes.extend(topology.skinning.iter().flat_map(|weights| weights.bones));
     let weights = topology.skinning.iter().flat_map(|weights| weights.weights);
     bytes.extend(weights.flat_map(f32::to_le_bytes));
@@ -183,7 +190,10 @@ impl<'a> Whole<'a> {
             triangles: Arc::new(self.triangles(layout.triangles, triangle_count)?),
             skinning: self.skinning(count)?,
         };
-        let field = decode(&self.header.field_kind, &self.bytes[layout.field..layout.crc])?;
+        let field = decode(
+            &self.header.field_kind,
+            &self.bytes[layout.field..layout.crc],
+        )?;
         Ok(Avatar {
             subject: self.header.subject,
             field,
@@ -211,7 +221,10 @@ impl<'a> Whole<'a> {
                 let valid = triangle.iter().all(|&vertex| vertex < self.header.vertices);
                 valid.then_some(triangle).ok_or_else(|| {
                     let vertices = self.header.vertices;
-                    self.broken(at, format!("triangle {triangle:?}, but {vertices} vertices"))
+                    self.broken(
+                        at,
+                        format!("triangle {triangle:?}, but {vertices} vertices"),
+                    )
                 })
             })
             .collect()
@@ -220,15 +233,22 @@ impl<'a> Whole<'a> {
     fn skinning(&self, count: usize) -> Result<Vec<VertexWeights>, AvatarError> {
         (0..count)
             .map(|index| {
-                let (bones_at, weights_at) =
-                    (self.layout.bones + 4 * index, self.layout.weights + 16 * index);
+                let (bones_at, weights_at) = (
+                    self.layout.bones + 4 * index,
+                    self.layout.weights + 16 * index,
+                );
                 let bones = std::array::from_fn(|slot| self.bytes[bones_at + slot]);
                 let weights = std::array::from_fn(|slot| self.float(weights_at + 4 * slot));
                 let valid = bones.iter().all(|&bone| usize::from(bone) < JOINT_COUNT)
                     && weights.iter().all(|weight| (0.0..=1.001).contains(weight));
-                valid.then_some(VertexWeights { bones, weights }).ok_or_else(|| {
-                    self.broken(bones_at, format!("bones {bones:?} with weights {weights:?}"))
-                })
+                valid
+                    .then_some(VertexWeights { bones, weights })
+                    .ok_or_else(|| {
+                        self.broken(
+                            bones_at,
+                            format!("bones {bones:?} with weights {weights:?}"),
+                        )
+                    })
             })
             .collect()
     }
@@ -248,7 +268,9 @@ fn read_bounded(path: &Path) -> Result<Vec<u8>, AvatarError> {
     let file = File::open(path).map_err(io)?;
     // One byte more than allowed tells a longer file.
     let mut bytes = Vec::new();
-    file.take(MAX_FILE_BYTES + 1).read_to_end(&mut bytes).map_err(io)?;
+    file.take(MAX_FILE_BYTES + 1)
+        .read_to_end(&mut bytes)
+        .map_err(io)?;
     if bytes.len() as u64 > MAX_FILE_BYTES {
         let what = format!("longer than {MAX_FILE_BYTES} bytes, which no avatar is");
         return Err(broken(path, bytes.len(), what));
@@ -263,7 +285,11 @@ fn check_prefix(path: &Path, bytes: &[u8]) -> Result<usize, AvatarError> {
         return Err(AvatarError::NotAnAvatar { path: path.to_path_buf(), found });
     }
     if bytes.len() < PREFIX_BYTES {
-        return Err(broken(path, bytes.len(), "the file ends before its header".to_owned()));
+        return Err(broken(
+            path,
+            bytes.len(),
+            "the file ends before its header".to_owned(),
+        ));
     }
     let found = u32_at(bytes, 8);
     if found != FORMAT {
@@ -330,10 +356,7 @@ mod tests {
             vertices_in_unit: vec![Vec3::X, Vec3::Y, Vec3::Z],
             normals: vec![Vec3::Z; 3],
             triangles: Arc::new(vec![[0, 1, 2]]),
-            skinning: vec![
-                VertexWeights { bones: [3, 0, 0, 0], weights: [1.0, 0.0, 0.0, 0.0] };
-                3
-            ],
+            skinning: vec![VertexWeights { bones: [3, 0, 0, 0], weights: [1.0, 0.0, 0.0, 0.0] }; 3],
         };
         let theta = [Vec3::splat(0.1); JOINT_COUNT];
         Avatar { subject, field: Arc::new(Sphere(0.5)), topology_theta: theta, topology }
@@ -357,37 +380,59 @@ mod tests {
         assert_eq!(back.topology_theta, avatar().topology_theta);
         assert_eq!(back.field.to_bytes(), avatar().field.to_bytes());
         assert_eq!(read_header(&path).unwrap().vertices, 3);
-        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1, "no unfinished file is left");
+        assert_eq!(
+            fs::read_dir(folder.path()).unwrap().count(),
+            1,
+            "no unfinished file is left"
+        );
     }
 
     #[test]
     fn foreign_files_newer_formats_and_other_bodies_are_told_apart() {
         let bytes = to_bytes(&avatar()).unwrap();
-        assert!(matches!(read_bytes(b"glTF...."), Err(AvatarError::NotAnAvatar { .. })));
-        assert!(matches!(read_bytes(b""), Err(AvatarError::NotAnAvatar { .. })));
+        assert!(matches!(
+            read_bytes(b"glTF...."),
+            Err(AvatarError::NotAnAvatar { .. })
+        ));
+        assert!(matches!(
+            read_bytes(b""),
+            Err(AvatarError::NotAnAvatar { .. })
+        ));
         let mut newer = bytes.clone();
         newer[8] = 9;
         let error = read_bytes(&newer).err().unwrap();
-        assert!(matches!(error, AvatarError::UnknownVersion { found: 9, expected: 1, .. }));
+        assert!(matches!(
+            error,
+            AvatarError::UnknownVersion { found: 9, expected: 1, .. }
+        ));
 
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.effigy");
         fs::write(&path, &bytes).unwrap();
         let error = read(&path, &BodyIdentity([8; 16]), &decode).err().unwrap();
         let text = error.to_string();
-        assert!(text.contains("a.effigy") && text.contains(&"07".repeat(16)), "{text}");
+        assert!(
+            text.contains("a.effigy") && text.contains(&"07".repeat(16)),
+            "{text}"
+        );
     }
 
     #[test]
     fn a_header_that_announces_too_much_is_refused_without_allocating_it() {
         let mut bytes = to_bytes(&avatar()).unwrap();
         let text = b"\"vertices\":3";
-        let at = bytes.windows(text.len()).position(|window| window == text).unwrap();
+        let at = bytes
+            .windows(text.len())
+            .position(|window| window == text)
+            .unwrap();
         bytes[at + text.len() - 1] = b'9';
         let error = read_bytes(&bytes).err().unwrap();
         assert!(matches!(error, AvatarError::Broken { .. }), "{error}");
         bytes[12..16].copy_from_slice(&u32::MAX.to_le_bytes());
-        assert!(matches!(read_bytes(&bytes), Err(AvatarError::Broken { offset: 12, .. })));
+        assert!(matches!(
+            read_bytes(&bytes),
+            Err(AvatarError::Broken { offset: 12, .. })
+        ));
     }
 
     #[test]
@@ -395,7 +440,12 @@ mod tests {
         let mut wild = avatar();
         wild.topology.triangles = Arc::new(vec![[0, 1, 3]]);
         let error = read_bytes(&to_bytes(&wild).unwrap()).err().unwrap();
-        assert!(error.to_string().contains("triangle [0, 1, 3], but 3 vertices"), "{error}");
+        assert!(
+            error
+                .to_string()
+                .contains("triangle [0, 1, 3], but 3 vertices"),
+            "{error}"
+        );
         wild = avatar();
         wild.topology.skinning[1].bones[0] = 24;
         assert!(read_bytes(&to_bytes(&wild).unwrap()).is_err());
@@ -408,10 +458,10 @@ mod tests {
         #![proptest_config(ProptestConfig::with_cases(200))]
 
         #[test]
-        fn no_flipped_bit_goes_unnoticed(position in any::<prop::sample::Index>(), bit in 0..8) {
+        fn no_flipped_bit_goes_unnoticed(position in any::<prop::sample::Index>(), bit in 0_u32..8) {
             let mut bytes = to_bytes(&avatar()).unwrap();
             let position = position.index(bytes.len());
-            bytes[position] ^= 1 << bit;
+            bytes[position] ^= 1_u8 << bit;
             prop_assert!(read_bytes(&bytes).is_err());
         }
 
