@@ -19,7 +19,8 @@ pub struct KeyframeConfig {
     pub max_residual_m: f32,
     /// Mean over the joints; below it the prior made the pose up.
     pub min_mean_confidence: f32,
-    /// A turn by this much, towards the camera, counts as one new view: eight make a full turn.
+    /// A turn by this much counts as one new view: a little under an eighth of a full turn, so that a person
+    /// who turns once gives eight.
     pub heading_step_rad: f32,
     /// A root-mean-square change of the joints by this much counts as one new pose.
     pub pose_step_rad: f32,
@@ -33,7 +34,7 @@ impl Default for KeyframeConfig {
             count: 8,
             max_residual_m: 0.04,
             min_mean_confidence: 0.2,
-            heading_step_rad: PI / 4.0,
+            heading_step_rad: 0.7,
             pose_step_rad: 0.35,
             min_gain: 1.25,
         }
@@ -232,4 +233,124 @@ fn pose_distance_rad(a: &BodyParams, b: &BodyParams) -> f32 {
         })
         .sum();
     (sum / (JOINT_COUNT - 1) as f32).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{Suit, everyday_poses};
+
+    /// Frames of one body: what they show does not matter here, so all share one image.
+    struct Frames(RegisteredFrame);
+
+    impl Frames {
+        fn new() -> Self {
+            Self(Suit::new(0.01).frame(&everyday_poses()[0], 0))
+        }
+
+        fn at(&self, heading_rad: f32, knee_rad: f32, residual: f32) -> RegisteredFrame {
+            let mut params = BodyParams::ZERO;
+            params.theta[0] = Vec3::new(0.0, heading_rad, 0.0);
+            for joint in [4, 5, 18, 19] {
+                params.theta[joint] = Vec3::new(knee_rad, 0.0, 0.0);
+            }
+            let tracking = Tracking::Tracked {
+                params,
+                residual_rms_m: residual,
+                joint_confidence: [0.8; JOINT_COUNT],
+            };
+            RegisteredFrame { tracking, ..self.0.clone() }
+        }
+    }
+
+    #[test]
+    fn a_full_turn_gives_eight_keyframes_spread_over_all_headings() {
+        let frames = Frames::new();
+        let mut selector = KeyframeSelector::new(KeyframeConfig::default());
+        for step in 0..240 {
+            selector.consider(&frames.at(step as f32 * 2.0 * PI / 240.0, 0.0, 0.01));
+        }
+        assert!(selector.is_full());
+        let mut headings: Vec<f32> = selector
+            .keyframes()
+            .iter()
+            .map(|keyframe| keyframe.heading_rad)
+            .collect();
+        headings.sort_by(f32::total_cmp);
+        for pair in headings.windows(2) {
+            assert!((pair[1] - pair[0]) > 0.65, "{headings:?}");
+        }
+    }
+
+    #[test]
+    fn standing_still_gives_one_keyframe_and_a_better_fit_replaces_it() {
+        let frames = Frames::new();
+        let mut selector = KeyframeSelector::new(KeyframeConfig::default());
+        assert!(matches!(
+            selector.consider(&frames.at(0.0, 0.0, 0.02)),
+            KeyframeVerdict::Kept { slot: 0, .. }
+        ));
+        assert!(matches!(
+            selector.consider(&frames.at(0.1, 0.0, 0.019)),
+            KeyframeVerdict::NothingNew { .. }
+        ));
+        assert!(matches!(
+            selector.consider(&frames.at(0.1, 0.0, 0.01)),
+            KeyframeVerdict::Better { slot: 0, .. }
+        ));
+        assert_eq!(selector.keyframes().len(), 1);
+    }
+
+    #[test]
+    fn poor_fits_lost_frames_and_nan_are_refused_with_the_reason() {
+        let frames = Frames::new();
+        let mut selector = KeyframeSelector::new(KeyframeConfig::default());
+        for residual in [0.2, f32::NAN] {
+            assert!(matches!(
+                selector.consider(&frames.at(0.0, 0.0, residual)),
+                KeyframeVerdict::PoorFit { .. }
+            ));
+        }
+        let mut lost = frames.at(0.0, 0.0, 0.01);
+        lost.tracking = Tracking::Lost { since: effigy_capture::Timestamp(0) };
+        assert_eq!(selector.consider(&lost), KeyframeVerdict::NotTracked);
+        assert!(selector.keyframes().is_empty());
+    }
+
+    #[test]
+    fn a_full_set_of_like_poses_opens_up_for_a_new_heading() {
+        let frames = Frames::new();
+        let config = KeyframeConfig { count: 3, ..KeyframeConfig::default() };
+        let mut selector = KeyframeSelector::new(config);
+        for knee in [0.0, 0.9, 1.8] {
+            assert!(
+                selector
+                    .consider(&frames.at(0.0, knee, 0.01))
+                    .slot()
+                    .is_some()
+            );
+        }
+        let verdict = selector.consider(&frames.at(PI, 0.9, 0.01));
+        assert!(
+            matches!(verdict, KeyframeVerdict::Spread { .. }),
+            "{verdict:?}"
+        );
+    }
+
+    #[test]
+    fn turning_body_or_camera_is_the_same_heading() {
+        let turned = BodyParams {
+            theta: {
+                let mut theta = [Vec3::ZERO; JOINT_COUNT];
+                theta[0] = Vec3::new(0.0, 0.7, 0.0);
+                theta
+            },
+            ..BodyParams::ZERO
+        };
+        let ahead = heading_rad(&BodyParams::ZERO, Vec3::new(0.0, 1.0, 2.0));
+        assert!(ahead.abs() < 1e-6);
+        assert!((heading_rad(&turned, Vec3::new(0.0, 1.0, 2.0)) - 0.7).abs() < 1e-5);
+        let camera = Quat::from_rotation_y(0.7) * Vec3::new(0.0, 1.0, 2.0);
+        assert!(heading_rad(&turned, camera).abs() < 1e-5);
+    }
 }

@@ -119,3 +119,130 @@ fn nearest_vertices(vertices: &[Vec3]) -> Option<ImmutableKdTree<f32, 3>> {
     let points: Vec<[f32; 3]> = vertices.iter().map(Vec3::to_array).collect();
     ImmutableKdTree::new_from_slice(&points).ok()
 }
+
+#[cfg(test)]
+mod tests {
+    use effigy_fusion::mesh::primitives::sphere;
+    use glam::vec3;
+
+    use super::*;
+
+    fn plane(z: f32, cells: u32) -> TriangleMesh {
+        let side = cells + 1;
+        let vertices = (0..side * side)
+            .map(|index| vec3((index % side) as f32, (index / side) as f32, 0.0) / cells as f32)
+            .map(|vertex| vertex + z * Vec3::Z)
+            .collect();
+        let triangles = (0..cells * cells)
+            .flat_map(|cell| {
+                let at = cell / cells * side + cell % cells;
+                [[at, at + 1, at + side + 1], [at, at + side + 1, at + side]]
+            })
+            .collect();
+        TriangleMesh::new(vertices, triangles)
+    }
+
+    fn measure(truth: &TriangleMesh, predicted: &TriangleMesh) -> SurfaceMetrics {
+        let measured = vec![true; truth.vertices.len()];
+        surface_metrics(truth, &measured, predicted)
+            .unwrap()
+            .unwrap()
+    }
+
+    #[test]
+    fn identical_meshes_are_at_zero_zero_one() {
+        let mesh = sphere(Vec3::ZERO, 0.5, 3);
+        assert_eq!(
+            measure(&mesh, &mesh),
+            SurfaceMetrics { d_p_cm: 0.0, d_f_cm: 0.0, nc: 1.0 }
+        );
+        assert_eq!(p2s_mm(&mesh, &mesh).unwrap(), 0.0);
+    }
+
+    #[test]
+    fn opposite_normals_have_a_consistency_of_minus_one() {
+        let mesh = sphere(Vec3::ZERO, 0.5, 3);
+        let mut turned = mesh.clone();
+        turned
+            .triangles
+            .iter_mut()
+            .for_each(|triangle| triangle.swap(0, 1));
+        assert!((measure(&mesh, &turned).nc + 1.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn a_plane_offset_by_two_centimetres_is_two_centimetres_off() {
+        let metrics = measure(&plane(0.0, 8), &plane(0.02, 8));
+        assert!((metrics.d_p_cm - 2.0).abs() < 1e-4 && (metrics.d_f_cm - 2.0).abs() < 1e-4);
+        assert!((p2s_mm(&plane(0.0, 8), &plane(0.02, 8)).unwrap() - 20.0).abs() < 1e-3);
+    }
+
+    #[test]
+    fn only_d_p_depends_on_how_dense_the_prediction_is() {
+        let truth = plane(0.0, 64);
+        let (coarse, fine) = (
+            measure(&truth, &plane(0.01, 8)),
+            measure(&truth, &plane(0.01, 64)),
+        );
+        assert!(coarse.d_p_cm > 3.0 * fine.d_p_cm);
+        assert!((coarse.d_f_cm - fine.d_f_cm).abs() < 1e-4);
+    }
+
+    #[test]
+    fn the_distance_runs_from_the_measured_truth_vertices_only() {
+        let (near, mut both) = (sphere(Vec3::ZERO, 0.5, 2), sphere(Vec3::ZERO, 0.5, 2));
+        let first = both.vertices.len() as u32;
+        let far = sphere(vec3(5.0, 0.0, 0.0), 0.5, 2);
+        both.vertices.extend(&far.vertices);
+        both.triangles
+            .extend(far.triangles.iter().map(|t| t.map(|vertex| vertex + first)));
+        // Far prediction: no harm. Far truth: harm, unless it is masked out.
+        assert!(measure(&near, &both).d_f_cm < 1e-4);
+        assert!(measure(&both, &near).d_f_cm > 100.0);
+        let measured: Vec<bool> = (0..both.vertices.len())
+            .map(|v| v < first as usize)
+            .collect();
+        assert!(
+            surface_metrics(&both, &measured, &near)
+                .unwrap()
+                .unwrap()
+                .d_f_cm
+                < 1e-4
+        );
+        assert_eq!(surface_metrics(&both, &[], &near).unwrap(), None);
+    }
+
+    #[test]
+    fn head_hands_and_feet_are_not_measured() {
+        let body = effigy_registration::smpl::builtin::body();
+        let measured = measured_vertices(&body);
+        let (mut top, mut tip) = (Vec3::NEG_INFINITY, Vec3::NEG_INFINITY);
+        for (vertex, _) in body
+            .template
+            .iter()
+            .zip(&measured)
+            .filter(|(_, measured)| **measured)
+        {
+            top = if vertex.y > top.y { *vertex } else { top };
+            tip = if vertex.x > tip.x { *vertex } else { tip };
+        }
+        let joints = body.joints(&body.template);
+        assert!(top.y < joints[15].y + 0.1, "the crown is the head's");
+        assert!(
+            tip.x < joints[20].x + 0.05,
+            "the hand is the wrist's and beyond"
+        );
+        let share =
+            measured.iter().filter(|measured| **measured).count() as f32 / measured.len() as f32;
+        assert!((0.2..0.9).contains(&share), "{share}");
+    }
+
+    #[test]
+    fn joints_and_vertices_are_compared_one_by_one() {
+        let truth = [Vec3::ZERO; JOINT_COUNT];
+        let mut predicted = truth;
+        predicted[3].x = 0.024;
+        assert!((mpjpe_mm(&truth, &predicted) - 1.0).abs() < 1e-5);
+        assert!(v2v_mm(&truth, &predicted[..3]).is_nan());
+    }
+}

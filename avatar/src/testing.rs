@@ -75,9 +75,9 @@ impl SignedDistanceField for InflatedBody {
     fn values_and_gradients(&self, points: &[Vec3], values: &mut [f32], gradients: &mut [Vec3]) {
         let hits = self.body.query_all(points);
         for (index, (point, hit)) in points.iter().zip(&hits).enumerate() {
-            let sign = self.body.sign(*point, hit);
-            values[index] = sign * hit.distance - self.thickness;
-            gradients[index] = (sign * (*point - hit.point)).normalize_or_zero();
+            let signed = self.body.sign(*point, hit);
+            values[index] = signed - self.thickness;
+            gradients[index] = (signed * (*point - hit.point)).normalize_or_zero();
         }
     }
 }
@@ -123,6 +123,12 @@ impl Suit {
         let model = effigy_registration::smpl::builtin::body();
         let subject = Subject::new(&model, &[0.0; 10]).unwrap();
         Self { model, subject, thickness_m }
+    }
+
+    /// The suit as a stiff field of the minimal body would move: without pose correctives.
+    pub(crate) fn without_correctives(&self, params: &BodyParams) -> TriangleMesh {
+        let (bones, _) = BoneTransforms::from_pose(&params.theta, &self.subject.rest_joints);
+        self.skinned(&bones, &self.at_rest(&BodyParams::ZERO.theta), params.trans)
     }
 
     /// The suit in the zero pose, pose correctives of `theta` included.
