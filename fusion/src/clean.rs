@@ -1,21 +1,36 @@
 //! A frame made metric, denoised, and reduced to the person.
 
-use effigy_capture::{FrameId, Timestamp};
+use effigy_capture::{Calibration, Frame, FrameId, Timestamp};
 use glam::Vec3;
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
-use crate::maps::{DepthMap, NormalMap, VertexMap};
+use crate::{
+    depth::{
+        bilateral::{Bilateral, BilateralConfig},
+        fill::{self, FillConfig, Filled},
+        flying_pixels::{FlyingPixelConfig, drop_flying_pixels},
+        segment::{Body, SegmentConfig, Segmentation, Segmenter},
+        tolerance::Tolerance,
+    },
+    error::FusionError,
+    maps::{DepthMap, NormalMap, Rays, Region, VertexMap},
+};
 
 /// One frame's clean geometry in the depth camera's space; all maps have one size.
 #[derive(Clone, Debug)]
 pub struct CleanFrame {
     pub id: FrameId,
     pub timestamp: Timestamp,
+    /// Everything in the working volume: cleaned where the person is, as measured elsewhere.
     pub depth: DepthMap,
+    /// The person's points; NaN elsewhere.
     pub vertices: VertexMap,
+    /// The person's normals; NaN elsewhere.
     pub normals: NormalMap,
     /// Pixels that belong to the person being followed.
     pub person: Vec<bool>,
-    /// Standard deviation of each pixel's depth, in metres.
+    /// Standard deviation of each of the person's depths, in metres; NaN elsewhere.
     pub sigma_m: Vec<f32>,
     /// The floor, where enough of it is seen.
     pub floor: Option<FloorPlane>,
@@ -36,4 +51,191 @@ pub enum PersonVisibility {
     /// The image border or the working volume cuts the body.
     Partial,
     Whole,
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct CleanConfig {
+    /// The working volume's nearest and farthest depth; the sensor's own range if not given.
+    pub range_m: Option<[f32; 2]>,
+    pub flying_pixels: FlyingPixelConfig,
+    pub bilateral: BilateralConfig,
+    pub fill: FillConfig,
+    /// A filled pixel was not measured: its sigma is this many times the sensor's.
+    pub filled_sigma_factor: f32,
+    pub segment: SegmentConfig,
+}
+
+impl Default for CleanConfig {
+    fn default() -> Self {
+        Self {
+            range_m: None,
+            flying_pixels: FlyingPixelConfig::default(),
+            bilateral: BilateralConfig::default(),
+            fill: FillConfig::default(),
+            filled_sigma_factor: 3.0,
+            segment: SegmentConfig::default(),
+        }
+    }
+}
+
+/// Pixels around the person in which flying pixels are looked for.
+const MARGIN_PX: usize = 8;
+
+/// Cleans one source's frames, one after the other.
+#[derive(Clone, Debug)]
+pub struct Cleaner {
+    calibration: Calibration,
+    config: CleanConfig,
+    rays: Rays,
+    tolerance: Tolerance,
+    segmenter: Segmenter,
+    bilateral: Bilateral,
+    bodies: Vec<Body>,
+    scratch_depth: Vec<f32>,
+    scratch_normals: Vec<Vec3>,
+}
+
+impl Cleaner {
+    pub fn new(calibration: Calibration, config: CleanConfig) -> Self {
+        let rays = Rays::new(&calibration.depth);
+        Self {
+            tolerance: Tolerance::new(calibration.sensor, &calibration.depth.intrinsics),
+            segmenter: Segmenter::new(&rays, config.segment.clone()),
+            bilateral: Bilateral::new(&config.bilateral),
+            bodies: Vec::new(),
+            scratch_depth: Vec::new(),
+            scratch_normals: Vec::new(),
+            rays,
+            calibration,
+            config,
+        }
+    }
+
+    /// Cleans the next frame. Nobody in view is not an error; a frame of another size is.
+    pub fn process(&mut self, frame: &Frame) -> Result<CleanFrame, FusionError> {
+        self.check_size(frame)?;
+        let range_m = self.config.range_m.unwrap_or(self.calibration.range_m);
+        let scale = self.calibration.metres_per_unit;
+        let mut depth = DepthMap::in_metres(&frame.depth, scale, range_m);
+        let Segmentation { mut person, region, floor, visibility, bodies } =
+            self.segmenter.segment(&depth, &self.rays, &self.tolerance);
+        self.bodies = bodies;
+        let filled = self.clean_person(&mut depth, &mut person, &region);
+        let vertices = self.unproject_person(&depth, &person, &region);
+        let normals = NormalMap::within(&vertices, &region, &mut self.scratch_normals);
+        let sigma_m = self.sigma(&vertices, &normals, &region, &filled);
+        let (id, timestamp) = (frame.id, frame.timestamp);
+        Ok(CleanFrame {
+            id,
+            timestamp,
+            depth,
+            vertices,
+            normals,
+            person,
+            sigma_m,
+            floor,
+            visibility,
+        })
+    }
+
+    /// Everything in the last frame with a body's measures, the person being followed first.
+    pub fn bodies(&self) -> &[Body] {
+        &self.bodies
+    }
+
+    fn check_size(&self, frame: &Frame) -> Result<(), FusionError> {
+        let got_px = [frame.depth.width(), frame.depth.height()];
+        let camera = &self.calibration.depth.intrinsics;
+        let expected_px = [camera.width, camera.height];
+        if got_px == expected_px {
+            return Ok(());
+        }
+        Err(FusionError::SizeMismatch { got_px, expected_px })
+    }
+
+    /// Drops flying pixels, smooths and fills where the person is; returns what was filled.
+    fn clean_person(
+        &mut self,
+        depth: &mut DepthMap,
+        person: &mut [bool],
+        region: &Region,
+    ) -> Vec<Filled> {
+        if region.is_empty() {
+            return Vec::new();
+        }
+        let around = region.grown(MARGIN_PX, depth.width, depth.height);
+        let flying = &self.config.flying_pixels;
+        drop_flying_pixels(
+            depth,
+            &around,
+            &self.tolerance,
+            flying,
+            &mut self.scratch_depth,
+        );
+        self.bilateral
+            .smooth(depth, region, person, &self.tolerance);
+        for y in region.rows.clone() {
+            let row = y * depth.width;
+            for pixel in row + region.columns.start..row + region.columns.end {
+                person[pixel] &= !depth.metres[pixel].is_nan();
+            }
+        }
+        let filled = fill::fill_holes(depth, person, region, &self.tolerance, &self.config.fill);
+        for &Filled { pixel, depth_m } in &filled {
+            depth.metres[pixel] = depth_m;
+            person[pixel] = true;
+        }
+        filled
+    }
+
+    fn unproject_person(&self, depth: &DepthMap, person: &[bool], region: &Region) -> VertexMap {
+        let mut vertices = VertexMap::empty(depth.width, depth.height);
+        for y in region.rows.clone() {
+            let row = y * depth.width;
+            for pixel in row + region.columns.start..row + region.columns.end {
+                if person[pixel] {
+                    vertices.points[pixel] = self.rays.point(pixel, depth.metres[pixel]);
+                }
+            }
+        }
+        vertices
+    }
+
+    /// The sensor's noise at each of the person's pixels, by depth and by angle of incidence.
+    fn sigma(
+        &self,
+        vertices: &VertexMap,
+        normals: &NormalMap,
+        region: &Region,
+        filled: &[Filled],
+    ) -> Vec<f32> {
+        let width = vertices.width;
+        let mut sigma_m = vec![f32::NAN; vertices.points.len()];
+        let rows = region.rows.start * width..region.rows.end * width;
+        let sensor = self.calibration.sensor;
+        sigma_m[rows]
+            .par_chunks_mut(width)
+            .enumerate()
+            .for_each(|(row, sigmas)| {
+                for x in region.columns.clone() {
+                    let pixel = (region.rows.start + row) * width + x;
+                    let (point, normal) = (vertices.points[pixel], normals.normals[pixel]);
+                    if !point.z.is_nan() {
+                        let cosine = -point.dot(normal) / point.length();
+                        // Without a normal: an edge, so as if seen at a grazing angle.
+                        let incidence_rad = if cosine.is_nan() {
+                            1.4
+                        } else {
+                            cosine.clamp(0.0, 1.0).acos()
+                        };
+                        sigmas[x] = sensor.sigma_m(point.z, incidence_rad);
+                    }
+                }
+            });
+        for fill in filled {
+            sigma_m[fill.pixel] *= self.config.filled_sigma_factor;
+        }
+        sigma_m
+    }
 }

@@ -4,11 +4,13 @@
 //! space (x right, y down, z forward, metres).
 
 pub mod clean;
+pub mod depth;
+mod disjoint_sets;
 pub mod error;
 pub mod maps;
 pub mod mesh;
 
-pub use clean::CleanFrame;
+pub use clean::{CleanConfig, CleanFrame, Cleaner};
 pub use error::FusionError;
 pub use maps::{DepthMap, NormalMap, VertexMap};
 pub use mesh::TriangleMesh;

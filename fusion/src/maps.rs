@@ -1,6 +1,16 @@
 //! Per-pixel geometry in the depth camera's space, row-major; NaN means "no measurement".
 
-use glam::Vec3;
+use std::ops::Range;
+
+use effigy_capture::{CameraModel, DepthImage};
+use glam::{Vec2, Vec3};
+use rayon::prelude::*;
+
+/// Neighbours whose depths differ by more than this share of the depth lie on different surfaces: a surface
+/// seen at 75 degrees changes by 1.5 % between the pixels compared here, and noise adds the rest.
+const STEP_SHARE: f32 = 0.025;
+/// Pixels between the neighbours a normal is computed from, to either side.
+const REACH_PX: usize = 2;
 
 /// Depth along the optical axis, in metres.
 #[derive(Clone, Debug, PartialEq)]
@@ -24,4 +34,274 @@ pub struct NormalMap {
     pub width: usize,
     pub height: usize,
     pub normals: Vec<Vec3>,
+}
+
+/// Where each pixel's ray meets the plane z = 1: computed once a camera, so that a lens costs nothing later.
+#[derive(Clone, Debug)]
+pub struct Rays {
+    pub width: usize,
+    pub height: usize,
+    pub on_unit_plane: Vec<Vec2>,
+}
+
+/// A rectangle of pixels.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Region {
+    pub columns: Range<usize>,
+    pub rows: Range<usize>,
+}
+
+impl Region {
+    pub fn whole(width: usize, height: usize) -> Self {
+        Self { columns: 0..width, rows: 0..height }
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.columns.is_empty() || self.rows.is_empty()
+    }
+
+    /// Grown by a border, within an image of that size.
+    pub fn grown(&self, border: usize, width: usize, height: usize) -> Self {
+        let grow = |range: &Range<usize>, size: usize| {
+            range.start.saturating_sub(border)..(range.end + border).min(size)
+        };
+        Self { columns: grow(&self.columns, width), rows: grow(&self.rows, height) }
+    }
+}
+
+impl Rays {
+    pub fn new(camera: &CameraModel) -> Self {
+        Self {
+            width: camera.intrinsics.width as usize,
+            height: camera.intrinsics.height as usize,
+            on_unit_plane: camera.rays(),
+        }
+    }
+
+    pub fn point(&self, pixel: usize, depth_m: f32) -> Vec3 {
+        self.on_unit_plane[pixel].extend(1.0) * depth_m
+    }
+}
+
+impl DepthMap {
+    /// Raw depth in metres; NaN where there is none, or where it lies outside `range_m`.
+    pub fn in_metres(image: &DepthImage, metres_per_unit: f32, range_m: [f32; 2]) -> Self {
+        let convert = |&raw: &u16| {
+            let depth_m = f32::from(raw) * metres_per_unit;
+            let usable = raw != 0 && depth_m >= range_m[0] && depth_m <= range_m[1];
+            if usable { depth_m } else { f32::NAN }
+        };
+        Self {
+            width: image.width() as usize,
+            height: image.height() as usize,
+            metres: image.pixels().iter().map(convert).collect(),
+        }
+    }
+
+    /// A map without any measurement.
+    pub fn empty(width: usize, height: usize) -> Self {
+        Self { width, height, metres: vec![f32::NAN; width * height] }
+    }
+
+    pub fn valid_count(&self) -> usize {
+        self.metres.iter().filter(|depth| depth.is_finite()).count()
+    }
+}
+
+impl VertexMap {
+    /// The point at each pixel's depth along its ray.
+    ///
+    /// # Panics
+    /// If depth and rays differ in size.
+    pub fn unproject(depth: &DepthMap, rays: &Rays) -> Self {
+        assert_eq!(
+            (depth.width, depth.height),
+            (rays.width, rays.height),
+            "one ray a pixel"
+        );
+        let points = depth
+            .metres
+            .par_iter()
+            .with_min_len(1 << 14)
+            .zip(&rays.on_unit_plane)
+            .map(|(&depth_m, ray)| ray.extend(1.0) * depth_m)
+            .collect();
+        Self { width: depth.width, height: depth.height, points }
+    }
+
+    pub fn empty(width: usize, height: usize) -> Self {
+        Self { width, height, points: vec![Vec3::NAN; width * height] }
+    }
+}
+
+impl NormalMap {
+    /// Normals of the surface through neighbouring points, smoothed over five pixels; steps in depth are
+    /// not bridged. NaN where there is no point, or where it has no neighbours.
+    pub fn from_vertices(vertices: &VertexMap) -> Self {
+        let whole = Region::whole(vertices.width, vertices.height);
+        Self::within(vertices, &whole, &mut Vec::new())
+    }
+
+    /// As [`Self::from_vertices`] within a region; `rough` is working memory.
+    pub(crate) fn within(vertices: &VertexMap, region: &Region, rough: &mut Vec<Vec3>) -> Self {
+        let (width, height) = (vertices.width, vertices.height);
+        let mut map = Self { width, height, normals: vec![Vec3::NAN; width * height] };
+        if region.is_empty() {
+            return map;
+        }
+        let columns = region.columns.len();
+        rough.clear();
+        rough.resize(columns * region.rows.len(), Vec3::NAN);
+        rough
+            .par_chunks_mut(columns)
+            .enumerate()
+            .for_each(|(row, normals)| {
+                for (column, normal) in normals.iter_mut().enumerate() {
+                    *normal = rough_normal(
+                        vertices,
+                        region.columns.start + column,
+                        region.rows.start + row,
+                    );
+                }
+            });
+        let patch = Patch { vertices, region, rough };
+        let rows = region.rows.start * width..region.rows.end * width;
+        map.normals[rows]
+            .par_chunks_mut(width)
+            .enumerate()
+            .for_each(|(row, normals)| {
+                for column in region.columns.clone() {
+                    normals[column] = patch.smooth_normal(column, region.rows.start + row);
+                }
+            });
+        map
+    }
+}
+
+/// The normal from the nearest points on the same surface left, right, above and below.
+fn rough_normal(vertices: &VertexMap, x: usize, y: usize) -> Vec3 {
+    let (width, height) = (vertices.width, vertices.height);
+    let here = y * width + x;
+    let center = vertices.points[here];
+    if center.z.is_nan() {
+        return Vec3::NAN;
+    }
+    let limit_m = STEP_SHARE * center.z;
+    let neighbour = |inside: bool, index: usize| {
+        let point = if inside {
+            vertices.points[index]
+        } else {
+            Vec3::NAN
+        };
+        // A NaN compares as false.
+        if (point.z - center.z).abs() < limit_m {
+            point
+        } else {
+            center
+        }
+    };
+    let left = neighbour(x >= REACH_PX, here.wrapping_sub(REACH_PX));
+    let right = neighbour(x + REACH_PX < width, here + REACH_PX);
+    let above = neighbour(y >= REACH_PX, here.wrapping_sub(REACH_PX * width));
+    let below = neighbour(y + REACH_PX < height, here + REACH_PX * width);
+    // Right cross down points away from the camera.
+    let normal = (below - above).cross(right - left).try_normalize();
+    normal.unwrap_or(Vec3::NAN)
+}
+
+/// Rough normals of a region, ready to be smoothed.
+struct Patch<'a> {
+    vertices: &'a VertexMap,
+    region: &'a Region,
+    rough: &'a [Vec3],
+}
+
+impl Patch<'_> {
+    fn smooth_normal(&self, x: usize, y: usize) -> Vec3 {
+        let center = self.vertices.points[y * self.vertices.width + x];
+        if center.z.is_nan() {
+            return Vec3::NAN;
+        }
+        let limit_m = STEP_SHARE * center.z;
+        let Region { columns, rows } = self.region;
+        let mut sum = Vec3::ZERO;
+        for dy in [-2_isize, 0, 2] {
+            for dx in [-2_isize, 0, 2] {
+                let (at_x, at_y) = (x.wrapping_add_signed(dx), y.wrapping_add_signed(dy));
+                if !(columns.contains(&at_x) && rows.contains(&at_y)) {
+                    continue;
+                }
+                let depth_m = self.vertices.points[at_y * self.vertices.width + at_x].z;
+                let normal = self.rough[(at_y - rows.start) * columns.len() + at_x - columns.start];
+                if (depth_m - center.z).abs() < limit_m && normal.x.is_finite() {
+                    sum += normal;
+                }
+            }
+        }
+        sum.try_normalize().unwrap_or(Vec3::NAN)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use effigy_capture::Intrinsics;
+    use glam::vec3;
+
+    use super::*;
+
+    const CAMERA: Intrinsics =
+        Intrinsics { width: 160, height: 120, fx: 130.0, fy: 131.0, cx: 80.2, cy: 59.1 };
+
+    fn map_of(depth_at: impl Fn(Vec2) -> f32) -> (DepthMap, Rays) {
+        let rays = Rays::new(&CAMERA.into());
+        let metres = rays
+            .on_unit_plane
+            .iter()
+            .map(|&ray| depth_at(ray))
+            .collect();
+        (DepthMap { width: 160, height: 120, metres }, rays)
+    }
+
+    #[test]
+    fn zero_and_far_pixels_have_no_depth() {
+        let image = DepthImage::new(4, 1, vec![0, 100, 1500, 9000]).unwrap();
+        let map = DepthMap::in_metres(&image, 0.001, [0.3, 5.0]);
+        assert_eq!(map.valid_count(), 1);
+        assert!((map.metres[2] - 1.5).abs() < 1e-6);
+    }
+
+    #[test]
+    fn normals_of_a_slanted_plane_are_exact_and_face_the_camera() {
+        let normal = vec3(0.4, -0.3, -0.8).try_normalize().unwrap();
+        let (depth, rays) = map_of(|ray| -1.2 / normal.dot(ray.extend(1.0)));
+        let normals = NormalMap::from_vertices(&VertexMap::unproject(&depth, &rays));
+        for &found in &normals.normals {
+            assert!(found.dot(normal) > 1.0 - 1e-4, "{found}");
+        }
+    }
+
+    #[test]
+    fn normals_beside_a_step_belong_to_their_own_side() {
+        let (depth, rays) = map_of(|ray| if ray.x < 0.0 { 1.0 } else { 1.4 });
+        let normals = NormalMap::from_vertices(&VertexMap::unproject(&depth, &rays));
+        for &found in &normals.normals {
+            assert!(found.dot(vec3(0.0, 0.0, -1.0)) > 0.9999, "{found}");
+        }
+    }
+
+    #[test]
+    fn missing_points_have_no_normal_and_do_not_disturb_their_neighbours() {
+        let (mut depth, rays) = map_of(|_| 2.0);
+        depth.metres[60 * 160 + 80] = f32::NAN;
+        let normals = NormalMap::from_vertices(&VertexMap::unproject(&depth, &rays));
+        let missing = normals
+            .normals
+            .iter()
+            .filter(|normal| normal.x.is_nan())
+            .count();
+        assert_eq!(missing, 1);
+        let (empty, rays) = map_of(|_| f32::NAN);
+        let normals = NormalMap::from_vertices(&VertexMap::unproject(&empty, &rays));
+        assert!(normals.normals.iter().all(|normal| normal.is_nan()));
+    }
 }

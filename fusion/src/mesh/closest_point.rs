@@ -54,11 +54,12 @@ struct Leaf {
 /// Normals whose sign tells inside from outside at any nearest point (Baerentzen and Aanaes 2005).
 #[derive(Clone, Debug, Default)]
 struct PseudoNormals {
-    of_triangles: Vec<Vec3>,
-    /// Weighted by the angle of each triangle at the vertex.
-    of_vertices: Vec<Vec3>,
+    /// Of each triangle.
+    faces: Vec<Vec3>,
+    /// Of each vertex, weighted by the angle of each triangle at the vertex.
+    corners: Vec<Vec3>,
     /// The sum of the two triangles' normals, for each triangle's edges ab, bc, ca.
-    of_edges: Vec<[Vec3; 3]>,
+    edges: Vec<[Vec3; 3]>,
 }
 
 impl ClosestPoint {
@@ -149,10 +150,10 @@ impl ClosestPoint {
     pub fn pseudo_normal(&self, hit: &Hit) -> Vec3 {
         let triangle = hit.triangle as usize;
         match hit.barycentric.to_array().map(|weight| weight == 0.0) {
-            [false, false, false] => self.normals.of_triangles[triangle],
-            [false, false, true] => self.normals.of_edges[triangle][0],
-            [true, false, false] => self.normals.of_edges[triangle][1],
-            [false, true, false] => self.normals.of_edges[triangle][2],
+            [false, false, false] => self.normals.faces[triangle],
+            [false, false, true] => self.normals.edges[triangle][0],
+            [true, false, false] => self.normals.edges[triangle][1],
+            [false, true, false] => self.normals.edges[triangle][2],
             [false, true, true] => self.vertex_normal(triangle, 0),
             [true, false, true] => self.vertex_normal(triangle, 1),
             [true, true, _] => self.vertex_normal(triangle, 2),
@@ -161,7 +162,7 @@ impl ClosestPoint {
 
     /// The unit normal of a triangle; zero if it has no area.
     pub fn triangle_normal(&self, triangle: u32) -> Vec3 {
-        self.normals.of_triangles[triangle as usize]
+        self.normals.faces[triangle as usize]
     }
 
     pub fn triangles(&self) -> &[[u32; 3]] {
@@ -169,7 +170,7 @@ impl ClosestPoint {
     }
 
     fn vertex_normal(&self, triangle: usize, corner: usize) -> Vec3 {
-        self.normals.of_vertices[self.triangles[triangle][corner] as usize]
+        self.normals.corners[self.triangles[triangle][corner] as usize]
     }
 
     fn search(&self, point: Vec3, max_squared: f32) -> Option<Hit> {
@@ -379,19 +380,19 @@ impl Leaf {
 
 impl PseudoNormals {
     fn update(&mut self, vertices: &[Vec3], triangles: &[[u32; 3]]) {
-        self.of_vertices.clear();
-        self.of_vertices.resize(vertices.len(), Vec3::ZERO);
-        self.of_triangles.clear();
+        self.corners.clear();
+        self.corners.resize(vertices.len(), Vec3::ZERO);
+        self.faces.clear();
         for corners in triangles {
             let [a, b, c] = corners.map(|vertex| vertices[vertex as usize]);
             let normal = doubled_area_normal(a, b, c).normalize_or_zero();
-            self.of_triangles.push(normal);
+            self.faces.push(normal);
             for (corner, [at, left, right]) in
                 [[a, b, c], [b, c, a], [c, a, b]].into_iter().enumerate()
             {
                 let angle = (left - at).angle_between(right - at);
                 if angle.is_finite() {
-                    self.of_vertices[corners[corner] as usize] += angle * normal;
+                    self.corners[corners[corner] as usize] += angle * normal;
                 }
             }
         }
@@ -401,13 +402,13 @@ impl PseudoNormals {
     fn sum_over_edges(&mut self, triangles: &[[u32; 3]]) {
         let sides = |[a, b, c]: [u32; 3]| [(a, b), (b, c), (c, a)];
         let mut sums: FxHashMap<(u32, u32), Vec3> = FxHashMap::default();
-        for (&corners, &normal) in triangles.iter().zip(&self.of_triangles) {
+        for (&corners, &normal) in triangles.iter().zip(&self.faces) {
             for (from, to) in sides(corners) {
                 *sums.entry((from.min(to), from.max(to))).or_default() += normal;
             }
         }
-        self.of_edges.clear();
-        self.of_edges.extend(
+        self.edges.clear();
+        self.edges.extend(
             triangles.iter().map(|&corners| {
                 sides(corners).map(|(from, to)| sums[&(from.min(to), from.max(to))])
             }),

@@ -1,6 +1,7 @@
 //! Connected parts of a mesh.
 
 use super::TriangleMesh;
+use crate::disjoint_sets::DisjointSets;
 
 /// The connected part with the most triangles, with its vertices renumbered; ties go to the first.
 pub fn largest_component(mesh: &TriangleMesh) -> TriangleMesh {
@@ -64,31 +65,6 @@ pub fn submesh(mesh: &TriangleMesh, keep: impl Fn(usize) -> bool) -> TriangleMes
         .map(|corners| corners.map(|vertex| new_of_old[vertex as usize]))
         .collect();
     part
-}
-
-/// Union-find with path halving; a set's root is its smallest member, so labels do not depend on order.
-pub(crate) struct DisjointSets {
-    parents: Vec<u32>,
-}
-
-impl DisjointSets {
-    pub(crate) fn new(count: usize) -> Self {
-        Self { parents: (0..count as u32).collect() }
-    }
-
-    pub(crate) fn root(&mut self, mut member: u32) -> u32 {
-        while self.parents[member as usize] != member {
-            let grandparent = self.parents[self.parents[member as usize] as usize];
-            self.parents[member as usize] = grandparent;
-            member = grandparent;
-        }
-        member
-    }
-
-    pub(crate) fn join(&mut self, a: u32, b: u32) {
-        let (a, b) = (self.root(a), self.root(b));
-        self.parents[a.max(b) as usize] = a.min(b);
-    }
 }
 
 #[cfg(test)]

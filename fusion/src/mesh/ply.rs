@@ -48,9 +48,9 @@ pub fn write(path: &Path, mesh: &TriangleMesh, encoding: Encoding) -> Result<(),
 
 /// The content of a file; normals and colours are written if there is one for each vertex.
 pub fn to_bytes(mesh: &TriangleMesh, encoding: Encoding) -> Vec<u8> {
-    let normals = mesh.normals.len() == mesh.vertices.len();
-    let colors = mesh.colors.len() == mesh.vertices.len();
-    let mut bytes = header(mesh, encoding, normals, colors).into_bytes();
+    let normals = has_normals(mesh);
+    let colors = has_colors(mesh);
+    let mut bytes = header(mesh, encoding).into_bytes();
     for (index, vertex) in mesh.vertices.iter().enumerate() {
         let normal = normals.then(|| mesh.normals[index].to_array());
         let numbers = vertex
@@ -89,7 +89,15 @@ pub fn to_bytes(mesh: &TriangleMesh, encoding: Encoding) -> Vec<u8> {
     bytes
 }
 
-fn header(mesh: &TriangleMesh, encoding: Encoding, normals: bool, colors: bool) -> String {
+fn has_normals(mesh: &TriangleMesh) -> bool {
+    mesh.normals.len() == mesh.vertices.len()
+}
+
+fn has_colors(mesh: &TriangleMesh) -> bool {
+    mesh.colors.len() == mesh.vertices.len()
+}
+
+fn header(mesh: &TriangleMesh, encoding: Encoding) -> String {
     let format = match encoding {
         Encoding::Ascii => "ascii",
         Encoding::BinaryLittleEndian => "binary_little_endian",
@@ -104,10 +112,10 @@ fn header(mesh: &TriangleMesh, encoding: Encoding, normals: bool, colors: bool) 
         }
     };
     property("float", &["x", "y", "z"]);
-    if normals {
+    if has_normals(mesh) {
         property("float", &["nx", "ny", "nz"]);
     }
-    if colors {
+    if has_colors(mesh) {
         property("uchar", &["red", "green", "blue"]);
     }
     let faces = mesh.triangles.len();

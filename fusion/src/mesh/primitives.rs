@@ -48,7 +48,7 @@ pub fn cuboid(min: Vec3, max: Vec3) -> TriangleMesh {
 }
 
 fn icosahedron() -> (Vec<Vec3>, Vec<[u32; 3]>) {
-    let golden = (1.0 + 5.0_f32.sqrt()) / 2.0;
+    let golden = 0.5 + 1.25_f32.sqrt();
     let corners = [
         [-1.0, golden, 0.0],
         [1.0, golden, 0.0],

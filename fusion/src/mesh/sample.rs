@@ -54,7 +54,7 @@ fn sample_triangle(mesh: &TriangleMesh, triangle: usize, random: &mut SplitMix) 
     }
 }
 
-/// SplitMix64 (Steele, Lea and Flood 2014): small, seeded, and the same on every machine.
+/// `SplitMix64` (Steele, Lea and Flood 2014): small, seeded, and the same on every machine.
 pub(crate) struct SplitMix {
     state: u64,
 }

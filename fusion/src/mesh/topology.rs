@@ -1,5 +1,6 @@
 //! How a mesh's triangles hang together: edges, borders, watertightness.
 
+use glam::Vec3;
 use rustc_hash::FxHashMap;
 
 use super::TriangleMesh;
@@ -44,7 +45,7 @@ impl TriangleMesh {
     pub fn volume(&self) -> f32 {
         let sixfold: f64 = (0..self.triangles.len())
             .map(|triangle| {
-                let [a, b, c] = self.corners(triangle).map(|corner| corner.as_dvec3());
+                let [a, b, c] = self.corners(triangle).map(Vec3::as_dvec3);
                 a.dot(b.cross(c))
             })
             .sum();
@@ -67,10 +68,6 @@ pub fn edge_report(triangles: &[[u32; 3]]) -> EdgeReport {
         }
     }
     report.edges = directions.len();
-    #[expect(
-        clippy::iter_over_hash_type,
-        reason = "sums do not depend on the order"
-    )]
     for [up, down] in directions.into_values() {
         match (up, down) {
             (1, 1) => {}
