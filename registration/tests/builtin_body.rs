@@ -1,8 +1,9 @@
 //! The built-in body is what the rest of the program takes it for.
 
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 
-use effigy_registration::smpl::{BodyParams, JOINT_COUNT, builtin};
+use effigy_registration::smpl::{BodyParams, JOINT_COUNT, VertexWeights, builtin, mirror};
+use glam::Vec3;
 
 #[test]
 fn surface_is_closed_and_faces_outwards() {
@@ -59,4 +60,79 @@ fn weights_are_shares() {
             "{row:?}"
         );
     }
+}
+
+#[test]
+fn sides_are_mirror_images_bit_for_bit() {
+    let body = builtin::body();
+    let mirror = mirror::builtin_vertices();
+    let flip = |v: Vec3| v * Vec3::new(-1.0, 1.0, 1.0);
+    for (i, &other) in mirror.iter().enumerate() {
+        let other = other as usize;
+        assert_eq!(mirror[other] as usize, i);
+        assert_eq!(body.template[other], flip(body.template[i]));
+        for direction in &body.shape_dirs {
+            assert_eq!(direction[other], flip(direction[i]));
+        }
+        let (here, there) = (body.skinning[i], body.skinning[other]);
+        assert_eq!(here.weights, there.weights);
+        let used = |row: VertexWeights| -> BTreeSet<(usize, u32)> {
+            let slots = row.bones.iter().zip(row.weights).filter(|(_, w)| *w > 0.0);
+            slots
+                .map(|(&bone, w)| (bone as usize, w.to_bits()))
+                .collect()
+        };
+        let mirrored = used(here)
+            .into_iter()
+            .map(|(b, w)| (mirror::MIRROR_JOINT[b], w))
+            .collect();
+        assert!(other == i || used(there) == mirrored, "vertex {i}");
+    }
+}
+
+#[test]
+fn mirrored_poses_give_mirrored_bodies() {
+    let body = builtin::body();
+    let mut params = BodyParams::ZERO;
+    params.betas = [0.5, -1.0, 0.7, 0.2, -0.4, 1.1, 0.3, -0.6, 0.9, -0.2];
+    for (joint, turn) in params.theta.iter_mut().enumerate() {
+        *turn = Vec3::new(0.1, -0.07, 0.05) * (joint % 5) as f32;
+    }
+    let mut mirrored = params;
+    for (joint, &other) in mirror::MIRROR_JOINT.iter().enumerate() {
+        mirrored.theta[other] = params.theta[joint] * Vec3::new(1.0, -1.0, -1.0);
+    }
+    let (posed, reflected) = (body.pose(&params), body.pose(&mirrored));
+    for (i, &other) in mirror::builtin_vertices().iter().enumerate() {
+        let expected = posed.vertices[i] * Vec3::new(-1.0, 1.0, 1.0);
+        let off_m = reflected.vertices[other as usize].distance(expected);
+        assert!(off_m < 1e-5, "vertex {i} is {off_m} m off its mirror image");
+    }
+}
+
+#[test]
+fn joints_of_the_template_lie_where_they_were_placed() {
+    let body = builtin::body();
+    let joints = body.joints(&body.template);
+    // Hip, knee, shoulder, wrist of the left side, as `builtin/joints.rs` lists them.
+    for (joint, expected) in [
+        (1, [0.072, -0.308, 0.020]),
+        (4, [0.088, -0.700, 0.012]),
+        (16, [0.178, 0.237, -0.018]),
+        (20, [0.705, 0.247, -0.045]),
+    ] {
+        assert!(
+            joints[joint].distance(Vec3::from(expected)) < 1e-5,
+            "joint {joint}"
+        );
+    }
+}
+
+#[test]
+fn identity_is_the_one_that_trained_files_carry() {
+    // Whoever changes the body changes this, and retrains what was trained on it.
+    assert_eq!(
+        builtin::body().identity.to_string(),
+        "3f175226fedd8d2effdfdc582b23d866"
+    );
 }

@@ -4,6 +4,7 @@
 //! skinning weights, shapes and pose correctives. `docs/body.md` says where each figure comes from.
 
 mod cage;
+mod correctives;
 mod figures;
 mod joints;
 mod shapes;
@@ -14,7 +15,7 @@ use std::sync::{Arc, OnceLock};
 
 use glam::{Vec3, vec3};
 
-use super::{BodyModel, PoseDirection};
+use super::BodyModel;
 use subdivide::PolygonSurface;
 
 /// Positions are rounded to this, so that no machine's last bit reaches the identity hash.
@@ -40,7 +41,7 @@ fn make() -> BodyModel {
     let mut body = BodyModel {
         identity: super::BodyIdentity([0; 16]),
         shape_dirs: shapes::shape_dirs(&template, &skin, &joints, &surface.mirror),
-        pose_dirs: vec![PoseDirection::default(); 207],
+        pose_dirs: correctives::pose_dirs(&template, &skin, &joints, &surface.mirror),
         joint_regressor: joints::regressor(&template, &surface.mirror, &joints),
         skinning: skin.sparse(&surface.mirror),
         template,

@@ -92,7 +92,7 @@ const SHAPES: [Shape; 10] = [
             Bump {
                 center: vec3(0.085, 0.085, 0.13),
                 reach: vec3(0.06, 0.06, 0.08),
-                push: vec3(0.002, -0.002, 0.016),
+                push: vec3(0.002, -0.002, 0.011),
             },
             Bump {
                 center: vec3(0.16, -0.27, -0.02),
@@ -223,5 +223,24 @@ impl Bump {
         let offset = (vertex * vec3(side, 1.0, 1.0) - self.center) / (self.reach * 1.6);
         let inside = (1.0 - offset.length_squared()).max(0.0);
         self.push * vec3(side, 1.0, 1.0) * (inside * inside)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Field, SHAPES};
+    use crate::smpl::builtin::{body, joints::centres};
+
+    #[test]
+    fn regressed_joints_follow_the_shapes_within_five_millimetres() {
+        let body = body();
+        for (beta, shape) in SHAPES.iter().enumerate() {
+            let designed = Field::new(shape, &centres()).moved_joints;
+            for (joint, row) in body.joint_regressor.iter().enumerate() {
+                let regressed = row.apply(&body.shape_dirs[beta]);
+                let off_mm = 1e3 * regressed.distance(designed[joint]);
+                assert!(off_mm < 5.0, "beta {beta}, joint {joint}: {off_mm:.1} mm");
+            }
+        }
     }
 }
