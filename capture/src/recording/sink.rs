@@ -61,7 +61,7 @@ struct Channels {
 }
 
 impl<W: Write> Sink<W> {
-    /// Writes everything that a reader needs before the first frame, and flushes it.
+    /// Writes and flushes what a reader needs before the first frame.
     pub(super) fn new(writer: W, head: &Head, color_codec: ColorCodec) -> Result<Self, SinkError> {
         let record = head.to_record()?;
         let mut mcap = WriteOptions::new()
@@ -72,8 +72,10 @@ impl<W: Write> Sink<W> {
             .disable_seeking(true)
             .create(NoSeek::new(CountBytes { inner: writer, bytes: 0 }))?;
         mcap.write_metadata(&Metadata { name: head::NAME.to_owned(), metadata: record })?;
-        let channels = Channels::add_to(&mut mcap)?;
         mcap.flush()?;
+        // Channels open the first chunk, which the first frames close: viewers take the time of a chunk without messages
+        // for 1970.
+        let channels = Channels::add_to(&mut mcap)?;
         Ok(Self {
             mcap,
             channels,

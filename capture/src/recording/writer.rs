@@ -3,7 +3,7 @@
 use std::{
     collections::BTreeMap,
     fs::File,
-    io::BufWriter,
+    io::{self, BufWriter, Write},
     path::{Path, PathBuf},
     sync::{
         Arc, Mutex, PoisonError,
@@ -128,36 +128,42 @@ impl RecordingWriter {
         metadata: &BTreeMap<String, String>,
         config: RecordConfig,
     ) -> Result<Self, CaptureError> {
-        let head = Head { calibration: calibration.clone(), metadata: metadata.clone() };
         calibration.check()?;
         let file = File::create(path)
             .map_err(|source| CaptureError::CannotCreate { path: path.to_owned(), source })?;
-        let sink = Sink::new(BufWriter::new(file), &head, config.color).map_err(|error| {
-            CaptureError::RecorderFailed {
-                path: path.to_owned(),
-                frames_written: 0,
-                reason: error.to_string(),
-            }
-        })?;
+        let head = Head { calibration: calibration.clone(), metadata: metadata.clone() };
+        Self::start(path, head, config, BufWriter::new(file), close_file)
+    }
+
+    /// Writes the head and starts the thread. `close` is called with the stream after the last byte.
+    fn start<W: Write + Send + 'static>(
+        path: &Path,
+        head: Head,
+        config: RecordConfig,
+        writer: W,
+        close: fn(W) -> io::Result<()>,
+    ) -> Result<Self, CaptureError> {
         let shared = Arc::new(Shared {
             path: path.to_owned(),
             failure: Mutex::new(None),
             frames_queue_full: AtomicU64::new(0),
             events_queue_full: AtomicU64::new(0),
         });
+        let failed = |error: SinkError| {
+            shared.error(Failure { frames_written: 0, reason: error.to_string() })
+        };
+        let sink = Sink::new(writer, &head, config.color).map_err(failed)?;
         let frames = config.queue_frames.max(1);
         let (commands, received) = channel::bounded(frames + EVENT_QUEUE);
         let (slots, taken_slots) = channel::bounded(frames);
-        let thread = {
-            let shared = Arc::clone(&shared);
-            thread::Builder::new()
-                .name("recorder".to_owned())
-                .spawn(move || write_all(sink, &received, &taken_slots, &shared))
-                .map_err(CaptureError::io(path))?
-        };
+        let of_thread = Arc::clone(&shared);
+        let thread = thread::Builder::new()
+            .name("recorder".to_owned())
+            .spawn(move || write_all(sink, &received, &taken_slots, &of_thread, close))
+            .map_err(CaptureError::io(path))?;
         Ok(Self {
             shared,
-            calibration: calibration.clone(),
+            calibration: head.calibration,
             commands: Some(commands),
             slots,
             thread: Some(thread),
@@ -302,32 +308,33 @@ impl Shared {
 
 /// The recorder's thread: writes until the sender is gone. After a failure it goes on taking frames, so that nobody
 /// waits for it.
-fn write_all(
-    mut sink: Sink<BufWriter<File>>,
+fn write_all<W: Write>(
+    mut sink: Sink<W>,
     commands: &Receiver<Command>,
     slots: &Receiver<()>,
     shared: &Shared,
+    close: fn(W) -> io::Result<()>,
 ) -> Result<Written, Failure> {
     let mut failed = None;
     let mut urgency = Urgency::Offline;
     loop {
-        let result = match commands.recv_timeout(IDLE_FLUSH) {
-            Ok(command) => {
-                if let Command::Frame(_, of_frame) = &command {
-                    urgency = *of_frame;
-                    let _slot = slots.try_recv();
-                }
-                if failed.is_none() {
-                    write(&mut sink, command)
-                } else {
-                    Ok(())
-                }
-            }
-            Err(RecvTimeoutError::Timeout) if urgency == Urgency::Live && failed.is_none() => {
-                sink.flush()
-            }
-            Err(RecvTimeoutError::Timeout) => Ok(()),
+        let command = match commands.recv_timeout(IDLE_FLUSH) {
+            Ok(command) => Some(command),
+            Err(RecvTimeoutError::Timeout) => None,
             Err(RecvTimeoutError::Disconnected) => break,
+        };
+        if let Some(Command::Frame(_, of_frame)) = &command {
+            urgency = *of_frame;
+            let _slot = slots.try_recv();
+        }
+        if failed.is_some() {
+            continue;
+        }
+        let result = match command {
+            Some(Command::Frame(frame, _)) => sink.frame(&frame),
+            Some(Command::Event { name, time, value }) => sink.event(&name, time, &value),
+            None if urgency == Urgency::Live => sink.flush(),
+            None => Ok(()),
         };
         if let Err(error) = result {
             let failure = Failure { frames_written: sink.frames, reason: error.to_string() };
@@ -340,33 +347,31 @@ fn write_all(
     }
     match failed {
         Some(failure) => Err(failure),
-        None => close(sink),
+        None => finish(sink, close),
     }
 }
 
-fn write(sink: &mut Sink<BufWriter<File>>, command: Command) -> Result<(), SinkError> {
-    match command {
-        Command::Frame(frame, _) => sink.frame(&frame),
-        Command::Event { name, time, value } => sink.event(&name, time, &value),
-    }
-}
-
-fn close(mut sink: Sink<BufWriter<File>>) -> Result<Written, Failure> {
+fn finish<W: Write>(mut sink: Sink<W>, close: fn(W) -> io::Result<()>) -> Result<Written, Failure> {
     let (frames, events) = (sink.frames, sink.events);
-    let failure = |reason: String| Failure { frames_written: frames, reason };
+    let failure = |error: SinkError| Failure { frames_written: frames, reason: error.to_string() };
     let duration_secs = sink
         .first_and_last
         .map_or(0.0, |(first, last)| last - first);
-    sink.finish().map_err(|error| failure(error.to_string()))?;
-    let (buffer, bytes) = sink.into_inner();
+    sink.finish().map_err(failure)?;
+    let (writer, bytes) = sink.into_inner();
+    close(writer).map_err(|error| failure(SinkError::Mcap(error.into())))?;
+    Ok(Written { frames, events, bytes, duration_secs })
+}
+
+fn close_file(buffer: BufWriter<File>) -> io::Result<()> {
     let file = buffer
         .into_inner()
-        .map_err(|error| failure(error.error().to_string()))?;
+        .map_err(io::IntoInnerError::into_error)?;
     // Devices and pipes cannot be synchronised; for them there is nothing to lose.
     if let Err(error) = file.sync_all() {
         tracing::debug!("the recording could not be synchronised to its disk: {error}");
     }
-    Ok(Written { frames, events, bytes, duration_secs })
+    Ok(())
 }
 
 fn check_size(
@@ -378,4 +383,97 @@ fn check_size(
         return Ok(());
     }
     Err(CaptureError::SizeMismatch { what, got_px, expected_px })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{DepthImage, FrameId, Intrinsics, Rigid3, SensorModel, recording::Recording};
+
+    /// A disk with room for so many bytes.
+    struct SmallDisk {
+        file: File,
+        room: usize,
+    }
+
+    impl Write for SmallDisk {
+        fn write(&mut self, data: &[u8]) -> io::Result<usize> {
+            if self.room == 0 {
+                return Err(io::ErrorKind::StorageFull.into());
+            }
+            let count = self.file.write(&data[..data.len().min(self.room)])?;
+            self.room -= count;
+            Ok(count)
+        }
+
+        fn flush(&mut self) -> io::Result<()> {
+            self.file.flush()
+        }
+    }
+
+    fn head() -> Head {
+        let intrinsics = Intrinsics { width: 16, height: 16, fx: 10.0, fy: 10.0, cx: 8.0, cy: 8.0 };
+        let calibration = Calibration {
+            sensor_name: "test".to_owned(),
+            depth: intrinsics.into(),
+            color: None,
+            color_from_depth: Rigid3::IDENTITY,
+            metres_per_unit: 0.001,
+            range_m: [0.1, 5.0],
+            rate_hz: 30.0,
+            sensor: SensorModel::StructuredLight,
+            world_from_camera: None,
+        };
+        Head { calibration, metadata: BTreeMap::new() }
+    }
+
+    fn frame(number: u64) -> Frame {
+        let depth = Arc::new(DepthImage::new(16, 16, vec![number as u16; 256]).unwrap());
+        Frame {
+            id: FrameId(number),
+            timestamp: Timestamp(number * 500_000_000),
+            depth,
+            color: None,
+        }
+    }
+
+    #[test]
+    fn a_disk_that_fills_up_is_reported_to_the_next_push_and_to_finish() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("small.mcap");
+        let disk = SmallDisk { file: File::create(&path).unwrap(), room: 20_000 };
+        let writer =
+            RecordingWriter::start(&path, head(), RecordConfig::default(), disk, |_| Ok(()))
+                .unwrap();
+        let error = (0..10_000).find_map(|number| writer.push_blocking(&frame(number)).err());
+        let message = error.expect("20 kB cannot hold this").to_string();
+        assert!(
+            message.contains("the disk is full") && message.contains("small.mcap"),
+            "{message}"
+        );
+        assert!(
+            writer
+                .event("swap", Timestamp(0), &serde_json::Value::Null)
+                .is_err()
+        );
+        assert!(
+            writer
+                .finish()
+                .unwrap_err()
+                .to_string()
+                .contains("the disk is full")
+        );
+        let recording = Recording::open(&path).unwrap();
+        assert!(recording.frame_count() > 5 && recording.damage().is_some());
+    }
+
+    #[test]
+    fn a_writer_that_nobody_finishes_still_closes_the_file() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("dropped.mcap");
+        let writer = RecordingWriter::create(&path, &head().calibration, &BTreeMap::new()).unwrap();
+        writer.push_blocking(&frame(0)).unwrap();
+        drop(writer);
+        assert_eq!(Recording::open(&path).unwrap().damage(), None);
+    }
 }
