@@ -9,7 +9,10 @@ mod codec;
 pub mod error;
 pub mod frame;
 pub mod image;
+pub mod import;
+pub mod queue;
 pub mod recording;
+pub mod replay;
 pub mod source;
 pub mod time;
 

@@ -1,8 +1,14 @@
 //! Where frames come from.
 
-use std::path::Path;
+use std::{fs::File, io::Read as _, path::Path};
 
-use crate::{calibration::Calibration, error::CaptureError, frame::Frame, recording::Player};
+use crate::{
+    calibration::Calibration,
+    error::CaptureError,
+    frame::Frame,
+    import::{pcd, still::Still, tum::TumFolder},
+    recording::{MAGIC, Player},
+};
 
 /// A sensor, a recording or a simulator.
 pub trait FrameSource: Send {
@@ -20,7 +26,35 @@ pub trait FrameSource: Send {
     }
 }
 
-/// Opens a recording.
+/// Opens a recording, a folder of depth images, a point cloud or a depth image: what it is shows in its first bytes.
 pub fn open(path: &Path) -> Result<Box<dyn FrameSource>, CaptureError> {
-    Ok(Box::new(Player::open(path)?))
+    if path.is_dir() {
+        return Ok(Box::new(TumFolder::open(path)?));
+    }
+    let start = first_bytes(path)?;
+    match start.as_slice() {
+        bytes if bytes == MAGIC => Ok(Box::new(Player::open(path)?)),
+        [b'#', b' ', b'.', b'P', b'C', b'D', ..]
+        | [b'V', b'E', b'R', b'S', b'I', b'O', b'N', ..] => Ok(Box::new(pcd::open(path)?)),
+        [0x89, b'P', b'N', b'G', ..] | [b'P', b'5', ..] => {
+            Ok(Box::new(Still::open_depth_image(path)?))
+        }
+        bytes => {
+            let found = match bytes {
+                [] => "nothing (the file is empty)".to_owned(),
+                bytes => format!("\"{}\"", bytes.escape_ascii()),
+            };
+            Err(CaptureError::UnknownSource { path: path.to_owned(), found })
+        }
+    }
+}
+
+/// As many as the longest magic has.
+fn first_bytes(path: &Path) -> Result<Vec<u8>, CaptureError> {
+    let file = File::open(path).map_err(CaptureError::io(path))?;
+    let mut start = Vec::new();
+    file.take(MAGIC.len() as u64)
+        .read_to_end(&mut start)
+        .map_err(CaptureError::io(path))?;
+    Ok(start)
 }

@@ -2,7 +2,7 @@
 
 use std::io::Cursor;
 
-use image::{ColorType, ImageEncoder as _, ImageFormat, ImageReader, Limits, codecs};
+use image::{ImageEncoder as _, ImageFormat, ImageReader, Limits, codecs::jpeg::JpegEncoder};
 use serde::{Deserialize, Serialize};
 
 use super::{MAX_PIXELS, check_size};
@@ -30,29 +30,63 @@ impl ColorCodec {
 }
 
 pub(crate) fn encode(image: &ColorImage, codec: ColorCodec) -> Result<Vec<u8>, String> {
-    let mut bytes = Vec::new();
-    let (pixels, width, height) = (image.pixels().as_flattened(), image.width(), image.height());
     match codec {
-        ColorCodec::Png => {
-            use codecs::png::{CompressionType, FilterType, PngEncoder};
-            PngEncoder::new_with_quality(&mut bytes, CompressionType::Fast, FilterType::Sub)
-                .write_image(pixels, width, height, ColorType::Rgb8.into())
-        }
+        ColorCodec::Png => encode_png(image).map_err(|error| error.to_string()),
         ColorCodec::Jpeg { quality_percent } => {
-            codecs::jpeg::JpegEncoder::new_with_quality(&mut bytes, quality_percent.clamp(1, 100))
-                .write_image(pixels, width, height, ColorType::Rgb8.into())
+            let mut bytes = Vec::new();
+            let pixels = image.pixels().as_flattened();
+            JpegEncoder::new_with_quality(&mut bytes, quality_percent.clamp(1, 100))
+                .write_image(
+                    pixels,
+                    image.width(),
+                    image.height(),
+                    image::ColorType::Rgb8.into(),
+                )
+                .map_err(|error| error.to_string())?;
+            Ok(bytes)
         }
     }
-    .map_err(|error| error.to_string())?;
-    Ok(bytes)
 }
 
 pub(crate) fn decode(bytes: &[u8]) -> Result<ColorImage, String> {
-    let format = match bytes {
-        [0x89, b'P', b'N', b'G', ..] => ImageFormat::Png,
-        [0xff, 0xd8, ..] => ImageFormat::Jpeg,
-        _ => return Err("expected a PNG or JPEG colour image".to_owned()),
-    };
+    match bytes {
+        [0x89, b'P', b'N', b'G', ..] => decode_png(bytes),
+        [0xff, 0xd8, ..] => decode_with_library(bytes, ImageFormat::Jpeg),
+        _ => Err("expected a PNG or JPEG colour image".to_owned()),
+    }
+}
+
+fn encode_png(image: &ColorImage) -> Result<Vec<u8>, png::EncodingError> {
+    let mut bytes = Vec::with_capacity(image.pixels().len());
+    let mut encoder = png::Encoder::new(&mut bytes, image.width(), image.height());
+    encoder.set_color(png::ColorType::Rgb);
+    encoder.set_compression(png::Compression::Fastest);
+    let mut writer = encoder.write_header()?;
+    writer.write_image_data(image.pixels().as_flattened())?;
+    writer.finish()?;
+    Ok(bytes)
+}
+
+/// Decodes 8-bit RGB straight into its pixels; palettes, alpha and grey go through the library.
+fn decode_png(bytes: &[u8]) -> Result<ColorImage, String> {
+    let mut decoder = png::Decoder::new(Cursor::new(bytes));
+    let header = decoder
+        .read_header_info()
+        .map_err(|error| error.to_string())?;
+    let (width, height) = header.size();
+    check_size(width, height)?;
+    if (header.color_type, header.bit_depth) != (png::ColorType::Rgb, png::BitDepth::Eight) {
+        return decode_with_library(bytes, ImageFormat::Png);
+    }
+    let mut pixels = vec![[0; 3]; width as usize * height as usize];
+    let mut reader = decoder.read_info().map_err(|error| error.to_string())?;
+    reader
+        .next_frame(pixels.as_flattened_mut())
+        .map_err(|error| error.to_string())?;
+    ColorImage::new(width, height, pixels).map_err(|error| error.to_string())
+}
+
+fn decode_with_library(bytes: &[u8], format: ImageFormat) -> Result<ColorImage, String> {
     let size = ImageReader::with_format(Cursor::new(bytes), format).into_dimensions();
     let (width, height) = size.map_err(|error| error.to_string())?;
     check_size(width, height)?;

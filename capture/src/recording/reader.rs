@@ -37,6 +37,15 @@ pub struct Event {
     pub value: serde_json::Value,
 }
 
+/// Whether colour, which takes ten times as long as depth to decode, is wanted.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum ColorUse {
+    #[default]
+    Decode,
+    /// Frames come without colour.
+    Skip,
+}
+
 /// An open recording. Holds an index and one chunk at a time; images are decoded when asked for.
 pub struct Recording {
     path: PathBuf,
@@ -48,6 +57,7 @@ pub struct Recording {
     events: Vec<Event>,
     damage: Option<Damage>,
     loaded: Option<(u32, Vec<u8>)>,
+    color_use: ColorUse,
 }
 
 impl Recording {
@@ -85,7 +95,12 @@ impl Recording {
             events,
             damage,
             loaded: None,
+            color_use: ColorUse::Decode,
         })
+    }
+
+    pub fn with_color(self, color_use: ColorUse) -> Self {
+        Self { color_use, ..self }
     }
 
     pub fn path(&self) -> &Path {
@@ -176,7 +191,7 @@ impl Recording {
             let reason = format!("it is {got_px:?}, the calibration expects {expected_px:?}");
             return Err(bad(&self.path, "the depth image", reason));
         }
-        let color = match entry.color {
+        let color = match entry.color.filter(|_| self.color_use == ColorUse::Decode) {
             Some(place) => {
                 let image = self.image(place, entry, "the colour image")?;
                 let color = color::decode(&image.data);
