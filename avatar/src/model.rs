@@ -2,6 +2,7 @@
 
 use std::{any::Any, sync::Arc};
 
+use effigy_fusion::TriangleMesh;
 use effigy_registration::{
     BodyModel, BodyParams,
     smpl::{BodyIdentity, JOINT_COUNT, UnitBox, VertexWeights, star_transforms},
@@ -12,9 +13,10 @@ use serde::{Deserialize, Serialize};
 use crate::{
     error::AvatarError,
     mesher,
+    neighbors::Neighbors,
     pose_input::PoseInput,
     sdf::SignedDistanceField,
-    skinning::{Skinning, four_largest, rest_from_canonical, star_body},
+    skinning::{BoneWeights, Skinning, average, four_largest, rest_from_canonical, star_body},
 };
 
 /// A field that changes with the pose: the hypernetwork, or a formula in tests.
@@ -73,11 +75,14 @@ pub struct TopologyConfig {
     pub vertices: usize,
     /// Rounds of evening out the triangles; each is followed by a step back onto the zero level.
     pub relax_rounds: usize,
+    /// Rounds of averaging skinning weights over neighbours: in the folds of the star pose the closest body
+    /// point jumps, and a posed mesh would crumple there.
+    pub smooth_rounds: usize,
 }
 
 impl Default for TopologyConfig {
     fn default() -> Self {
-        Self { vertices: 7500, relax_rounds: 4 }
+        Self { vertices: 7500, relax_rounds: 4, smooth_rounds: 12 }
     }
 }
 
@@ -142,29 +147,60 @@ impl Topology {
             mesh = mesher::extract(sdf, resolution);
         }
         mesher::relax(&mut mesh, sdf, config.relax_rounds);
-        let skinning = Self::skin(&mesh.vertices, &mesh.normals, subject, skinning);
+        let weights = Self::forward_weights(&mesh, subject, skinning, config.smooth_rounds);
         Ok(Self {
             vertices_in_unit: mesh.vertices,
             normals: mesh.normals,
             triangles: Arc::new(mesh.triangles),
-            skinning,
+            skinning: weights.iter().map(four_largest).collect(),
         })
     }
 
-    fn skin(
-        vertices_in_unit: &[Vec3],
-        normals: &[Vec3],
+    fn forward_weights(
+        mesh: &TriangleMesh,
         subject: &Subject,
         skinning: &dyn Skinning,
-    ) -> Vec<VertexWeights> {
-        let in_canonical: Vec<Vec3> = vertices_in_unit
+        smooth_rounds: usize,
+    ) -> Vec<BoneWeights> {
+        let in_canonical: Vec<Vec3> = mesh
+            .vertices
             .iter()
             .map(|&vertex| subject.unit_box.canonical_from_unit(vertex))
             .collect();
-        skinning
-            .forward(&in_canonical, normals)
+        let mut weights: Vec<BoneWeights> = skinning
+            .forward(&in_canonical, &mesh.normals)
             .iter()
-            .map(|point| four_largest(&point.weights))
-            .collect()
+            .map(|point| point.weights)
+            .collect();
+        let neighbors = Neighbors::new(mesh.vertices.len(), &mesh.triangles);
+        for _ in 0..smooth_rounds {
+            let averaged = average(&neighbors, &weights);
+            weights = (0..weights.len())
+                .map(|vertex| {
+                    let share = jump_share(&neighbors, &weights, vertex);
+                    let (old, new) = (&weights[vertex], &averaged[vertex]);
+                    std::array::from_fn(|bone| old[bone] + share * (new[bone] - old[bone]))
+                })
+                .collect();
+        }
+        weights
     }
+}
+
+/// How much a vertex needs smoothing: not at all where weights differ from its neighbours' as much as they
+/// do across a joint, fully where they jump from one bone to another.
+fn jump_share(neighbors: &Neighbors, weights: &[BoneWeights], vertex: usize) -> f32 {
+    /// Differences summed over the bones: 2 is from one bone entirely to another.
+    const JOINT: f32 = 0.3;
+    const JUMP: f32 = 0.6;
+    let difference = |other: u32| -> f32 {
+        let pairs = weights[vertex].iter().zip(&weights[other as usize]);
+        pairs.map(|(a, b)| (a - b).abs()).sum()
+    };
+    let largest = neighbors
+        .of(vertex)
+        .iter()
+        .map(|&other| difference(other))
+        .fold(0.0, f32::max);
+    ((largest - JOINT) / (JUMP - JOINT)).clamp(0.0, 1.0)
 }

@@ -11,12 +11,11 @@ use glam::Vec3;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use crate::neighbors::Neighbors;
-
 use super::{
-    BoneWeights, SkinnedPoint, Skinning, dense, fold_extremities,
+    BoneWeights, SkinnedPoint, Skinning, average, dense, fold_extremities,
     oriented_bvh::{OrientedBvh, OrientedHit},
 };
+use crate::neighbors::Neighbors;
 
 /// How body weights become point weights.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -131,26 +130,4 @@ fn smoothing_levels(model: &BodyModel, star: &[Vec3], full_m: f32) -> Vec<Vec<Bo
         levels.push(next);
     }
     levels
-}
-
-/// Half of a vertex's own weights, half of its neighbours' mean.
-fn average(neighbors: &Neighbors, weights: &[BoneWeights]) -> Vec<BoneWeights> {
-    (0..weights.len())
-        .into_par_iter()
-        .with_min_len(256)
-        .map(|vertex| {
-            let around = neighbors.of(vertex);
-            if around.is_empty() {
-                return weights[vertex];
-            }
-            let mut sum = [0.0; JOINT_COUNT];
-            for &other in around {
-                for (sum, &weight) in sum.iter_mut().zip(&weights[other as usize]) {
-                    *sum += weight;
-                }
-            }
-            let scale = 0.5 / around.len() as f32;
-            std::array::from_fn(|bone| 0.5 * weights[vertex][bone] + scale * sum[bone])
-        })
-        .collect()
 }

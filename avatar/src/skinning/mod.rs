@@ -13,6 +13,9 @@ use effigy_registration::{
     smpl::{JOINT_COUNT, VertexWeights},
 };
 use glam::Vec3;
+use rayon::prelude::*;
+
+use crate::neighbors::Neighbors;
 
 pub(crate) use closest_body_point::star_body;
 pub use closest_body_point::{ClosestBodyPoint, ClosestBodyPointConfig};
@@ -78,6 +81,28 @@ pub fn four_largest(weights: &BoneWeights) -> VertexWeights {
         }
     }
     four
+}
+
+/// Half of a vertex's own weights, half of its neighbours' mean.
+pub(crate) fn average(neighbors: &Neighbors, weights: &[BoneWeights]) -> Vec<BoneWeights> {
+    (0..weights.len())
+        .into_par_iter()
+        .with_min_len(256)
+        .map(|vertex| {
+            let around = neighbors.of(vertex);
+            if around.is_empty() {
+                return weights[vertex];
+            }
+            let mut sum = [0.0; JOINT_COUNT];
+            for &other in around {
+                for (sum, &weight) in sum.iter_mut().zip(&weights[other as usize]) {
+                    *sum += weight;
+                }
+            }
+            let scale = 0.5 / around.len() as f32;
+            std::array::from_fn(|bone| 0.5 * weights[vertex][bone] + scale * sum[bone])
+        })
+        .collect()
 }
 
 #[cfg(test)]
