@@ -61,12 +61,12 @@ pub fn write(path: &Path, avatar: &Avatar) -> Result<(), AvatarError> {
 /// Reads an avatar that was made with this body.
 pub fn read(
     path: &Path,
-    body: &BodyIdentity,
+    body: BodyIdentity,
     decode: &FieldDecoder<'_>,
 ) -> Result<Avatar, AvatarError> {
     let file = Whole::read(path)?;
     let found = file.header.subject.body;
-    if found != *body {
+    if found != body {
         return Err(AvatarError::OtherBody {
             path: path.to_path_buf(),
             found: found.to_string(),
@@ -341,7 +341,10 @@ mod tests {
     }
 
     fn decode(kind: &str, bytes: &[u8]) -> Result<Arc<dyn PoseField>, AvatarError> {
-        assert_eq!(kind, "sphere");
+        if kind != "sphere" {
+            let expected = "sphere".to_owned();
+            return Err(AvatarError::UnknownField { found: kind.to_owned(), expected });
+        }
         Ok(Arc::new(Sphere(f32::from_bits(u32_at(bytes, 0)))))
     }
 
@@ -366,7 +369,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.effigy");
         fs::write(&path, bytes).unwrap();
-        read(&path, &BodyIdentity([7; 16]), &decode)
+        read(&path, BodyIdentity([7; 16]), &decode)
     }
 
     #[test]
@@ -374,7 +377,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.effigy");
         write(&path, &avatar()).unwrap();
-        let back = read(&path, &BodyIdentity([7; 16]), &decode).unwrap();
+        let back = read(&path, BodyIdentity([7; 16]), &decode).unwrap();
         assert_eq!(back.subject, avatar().subject);
         assert_eq!(back.topology, avatar().topology);
         assert_eq!(back.topology_theta, avatar().topology_theta);
@@ -409,7 +412,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.effigy");
         fs::write(&path, &bytes).unwrap();
-        let error = read(&path, &BodyIdentity([8; 16]), &decode).err().unwrap();
+        let error = read(&path, BodyIdentity([8; 16]), &decode).err().unwrap();
         let text = error.to_string();
         assert!(
             text.contains("a.effigy") && text.contains(&"07".repeat(16)),

@@ -147,11 +147,12 @@ impl KeyframeSelector {
             self.keyframes[nearest] = candidate;
             return KeyframeVerdict::Better { slot: nearest, residual_rms_m, was_m };
         }
-        if let Some((slot, was)) = self.most_alike().filter(|_| self.is_full()) {
-            if novelty > self.config.min_gain * was {
-                self.keyframes[slot] = candidate;
-                return KeyframeVerdict::Spread { slot, novelty, was };
-            }
+        if self.is_full()
+            && let Some((slot, was)) = self.most_alike()
+            && novelty > self.config.min_gain * was
+        {
+            self.keyframes[slot] = candidate;
+            return KeyframeVerdict::Spread { slot, novelty, was };
         }
         KeyframeVerdict::NothingNew { novelty }
     }
@@ -162,13 +163,12 @@ impl KeyframeSelector {
             return Err(KeyframeVerdict::NotTracked);
         };
         let (residual_rms_m, limit_m) = (*residual_rms_m, self.config.max_residual_m);
-        // Negated, so that NaN is refused too.
-        if !(residual_rms_m <= limit_m) {
+        if residual_rms_m.is_nan() || residual_rms_m > limit_m {
             return Err(KeyframeVerdict::PoorFit { residual_rms_m, limit_m });
         }
         let mean_confidence = joint_confidence.iter().sum::<f32>() / JOINT_COUNT as f32;
         let limit = self.config.min_mean_confidence;
-        if !(mean_confidence >= limit) {
+        if mean_confidence.is_nan() || mean_confidence < limit {
             return Err(KeyframeVerdict::PoorlySeen { mean_confidence, limit });
         }
         let camera_in_world = frame.world_from_camera.translation;

@@ -38,7 +38,7 @@ pub fn measured_vertices(model: &BodyModel) -> Vec<bool> {
         .collect()
 }
 
-/// D_p, D_f and NC of a prediction; `measured` says which truth vertices count.
+/// `D_p`, `D_f` and NC of a prediction; `measured` says which truth vertices count.
 ///
 /// `None` if nothing is left to measure. Normals are those of the meshes' triangles, weighted by area.
 pub fn surface_metrics(

@@ -68,7 +68,7 @@ pub struct Topology {
 }
 
 /// How the mesh of fixed topology is made.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct TopologyConfig {
     /// Vertices aimed at; what the field gives lies within a few percent.
@@ -99,15 +99,15 @@ pub struct Avatar {
 impl Avatar {
     /// Extracts the mesh at one pose (the keyframes' mean, say) and skins it.
     pub fn new(
-        subject: Subject,
+        subject: &Subject,
         field: Arc<dyn PoseField>,
         skinning: &dyn Skinning,
         theta: &[Vec3; JOINT_COUNT],
         config: &TopologyConfig,
     ) -> Result<Self, AvatarError> {
         let sdf = field.field(&subject.pose_input(theta));
-        let topology = Topology::extract(&*sdf, &subject, skinning, config)?;
-        Ok(Self { subject, field, topology_theta: *theta, topology })
+        let topology = Topology::extract(&*sdf, subject, skinning, config)?;
+        Ok(Self { subject: *subject, field, topology_theta: *theta, topology })
     }
 
     /// For each topology vertex, rest (zero pose) from canonical space.

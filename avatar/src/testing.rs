@@ -218,11 +218,14 @@ pub(crate) fn everyday_poses() -> Vec<BodyParams> {
     ]
 }
 
+/// The camera of [`Suit::frame`].
+pub(crate) const CAMERA: Intrinsics =
+    Intrinsics { width: 320, height: 288, fx: 252.0, fy: 252.0, cx: 159.5, cy: 143.5 };
+
 fn clean_frame(in_camera: &[Vec3], triangles: &[[u32; 3]], id: u64) -> CleanFrame {
     const WALL_M: f32 = 4.0;
-    let camera = Intrinsics { width: 320, height: 288, fx: 252.0, fy: 252.0, cx: 159.5, cy: 143.5 };
     let normals_in_camera = vertex_normals(in_camera, triangles);
-    let mut rasterizer = Rasterizer::new(camera);
+    let mut rasterizer = Rasterizer::new(CAMERA);
     let raster = rasterizer.draw(in_camera, triangles);
     let (width, height) = (raster.width, raster.height);
     let count = width * height;
@@ -231,9 +234,9 @@ fn clean_frame(in_camera: &[Vec3], triangles: &[[u32; 3]], id: u64) -> CleanFram
         timestamp: Timestamp(0),
         depth: DepthMap { width, height, metres: vec![WALL_M; count] },
         vertices: VertexMap { width, height, points: vec![Vec3::NAN; count] },
-        normals: NormalMap { width, height, normals: vec![Vec3::NEG_Z; count] },
+        normals: NormalMap { width, height, normals: vec![Vec3::NAN; count] },
         person: vec![false; count],
-        sigma_m: vec![0.002; count],
+        sigma_m: vec![f32::NAN; count],
         floor: None,
         visibility: PersonVisibility::Whole,
     };
@@ -241,14 +244,15 @@ fn clean_frame(in_camera: &[Vec3], triangles: &[[u32; 3]], id: u64) -> CleanFram
         if let Some((triangle, barycentric)) = raster.hit(pixel) {
             clean.depth.metres[pixel] = raster.depth[pixel];
             clean.person[pixel] = true;
+            clean.sigma_m[pixel] = 0.002;
+            let place = vec2((pixel % width) as f32, (pixel / width) as f32);
+            clean.vertices.points[pixel] = CAMERA.unproject(place, raster.depth[pixel]);
             let corners = triangles[triangle as usize];
             clean.normals.normals[pixel] = (0..3)
                 .map(|corner| normals_in_camera[corners[corner] as usize] * barycentric[corner])
                 .sum::<Vec3>()
                 .normalize_or_zero();
         }
-        let place = vec2((pixel % width) as f32, (pixel / width) as f32);
-        clean.vertices.points[pixel] = camera.unproject(place, clean.depth.metres[pixel]);
     }
     clean
 }
@@ -265,7 +269,7 @@ pub(crate) fn suit_avatar(growth_m: f32) -> Avatar {
     field.growth = growth_m / suit.subject.unit_box.metres_per_unit();
     let theta = BodyParams::ZERO.theta;
     Avatar::new(
-        suit.subject,
+        &suit.subject,
         Arc::new(field),
         &skinning,
         &theta,

@@ -1,6 +1,6 @@
 //! Points the camera saw to be empty: in front of the person's surface, and beside the person's outline.
 
-use effigy_fusion::CleanFrame;
+use effigy_fusion::{CleanFrame, maps::Rays};
 use effigy_registration::RegisteredFrame;
 use glam::Vec3;
 use rand::{RngExt as _, rngs::StdRng};
@@ -17,12 +17,16 @@ const BEFORE_BACKGROUND_M: f32 = 0.04;
 /// Empty points in world space, in random order.
 pub(super) fn points_in_world(
     frame: &RegisteredFrame,
+    rays: Option<&Rays>,
     config: &CanonicaliseConfig,
     rng: &mut StdRng,
 ) -> Vec<Vec3> {
     let wanted = config.free_points.div_ceil(2) * CANDIDATES;
     let in_front = in_front(&frame.clean, config, wanted, rng);
-    let beside = beside(&frame.clean, config, wanted, rng);
+    let beside = rays
+        .filter(|rays| rays.on_unit_plane.len() == frame.clean.depth.metres.len())
+        .map(|rays| beside(&frame.clean, rays, config, wanted, rng))
+        .unwrap_or_default();
     // Taken in turn, so that cutting the list later keeps both kinds.
     let mut points: Vec<Vec3> = Vec::with_capacity(in_front.len() + beside.len());
     for index in 0..in_front.len().max(beside.len()) {
@@ -46,7 +50,7 @@ fn in_front(
         .filter(|&pixel| clean.person[pixel] && clean.vertices.points[pixel].is_finite())
         .collect();
     let [nearest, farthest] = config.free_in_front_m;
-    if seen.is_empty() || !(nearest < farthest) {
+    if seen.is_empty() || nearest >= farthest {
         return Vec::new();
     }
     (0..wanted)
@@ -63,6 +67,7 @@ fn in_front(
 /// Points on the rays just beside the person's outline, at about the person's depth.
 fn beside(
     clean: &CleanFrame,
+    rays: &Rays,
     config: &CanonicaliseConfig,
     wanted: usize,
     rng: &mut StdRng,
@@ -74,17 +79,17 @@ fn beside(
     (0..wanted)
         .filter_map(|_| {
             let (pixel, person_depth_m) = outline[rng.random_range(0..outline.len())];
-            let background = clean.vertices.points[pixel];
+            let background_m = clean.depth.metres[pixel];
             let depth_m = person_depth_m + rng.random_range(-BESIDE_DEPTH_M..BESIDE_DEPTH_M);
-            let empty = depth_m > 0.0 && depth_m < background.z - BEFORE_BACKGROUND_M;
-            empty.then(|| background * (depth_m / background.z))
+            let empty = depth_m > 0.0 && depth_m < background_m - BEFORE_BACKGROUND_M;
+            empty.then(|| rays.point(pixel, depth_m))
         })
         .collect()
 }
 
 /// Background pixels with a measurement near the person's outline, and the depth of the person there.
 fn outline(clean: &CleanFrame, [nearest_px, farthest_px]: [u32; 2]) -> Vec<(usize, f32)> {
-    let (width, height) = (clean.vertices.width, clean.vertices.height);
+    let (width, height) = (clean.depth.width, clean.depth.height);
     // The person's depth spreads one pixel outwards a round.
     let mut depth_of_person: Vec<f32> = (0..width * height)
         .map(|pixel| {
@@ -110,7 +115,7 @@ fn outline(clean: &CleanFrame, [nearest_px, farthest_px]: [u32; 2]) -> Vec<(usiz
                 reached[neighbor] = true;
                 depth_of_person[neighbor] = depth_of_person[pixel];
                 next.push(neighbor);
-                let measured = clean.vertices.points[neighbor].is_finite();
+                let measured = clean.depth.metres[neighbor].is_finite();
                 if distance_px >= nearest_px && measured && depth_of_person[neighbor].is_finite() {
                     found.push((neighbor, depth_of_person[neighbor]));
                 }

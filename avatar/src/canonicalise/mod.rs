@@ -5,7 +5,8 @@ mod free_space;
 
 use std::sync::Arc;
 
-use effigy_fusion::CleanFrame;
+use effigy_capture::CameraModel;
+use effigy_fusion::{CleanFrame, maps::Rays};
 use effigy_registration::{BodyModel, BodyParams, PosedBody, RegisteredFrame};
 use glam::Vec3;
 use rand::{RngExt as _, SeedableRng as _, rngs::StdRng};
@@ -86,6 +87,7 @@ pub struct Canonicaliser {
     subject: Subject,
     skinning: Arc<dyn Skinning>,
     config: CanonicaliseConfig,
+    rays: Option<Rays>,
 }
 
 /// Points in world space with what is known of them.
@@ -123,7 +125,13 @@ impl Canonicaliser {
         config: CanonicaliseConfig,
     ) -> Result<Self, AvatarError> {
         let subject = Subject::new(&model, betas)?;
-        Ok(Self { model, subject, skinning, config })
+        Ok(Self { model, subject, skinning, config, rays: None })
+    }
+
+    /// Tells where background pixels look, which gives empty points beside the person too.
+    pub fn with_camera(mut self, camera: &CameraModel) -> Self {
+        self.rays = Some(Rays::new(camera));
+        self
     }
 
     pub fn subject(&self) -> &Subject {
@@ -151,7 +159,7 @@ impl Canonicaliser {
         let seen = seen.pick(2 * self.config.points, &mut rng);
         let (points_in_unit, normals, weights) = self.surface(&seen, &posed, &warp, &mut counts);
 
-        let free = free_space::points_in_world(frame, &self.config, &mut rng);
+        let free = free_space::points_in_world(frame, self.rays.as_ref(), &self.config, &mut rng);
         let free_in_unit = self.free(&free, &posed, &warp);
         counts.free = free_in_unit.len();
         let samples = CanonicalSamples {
@@ -225,7 +233,7 @@ impl Canonicaliser {
             let in_unit = self.subject.unit_box.unit_from_canonical(point.canonical);
             if point.distance_to_body_m > self.config.max_distance_to_body_m {
                 counts.far_from_body += 1;
-            } else if !(point.miss_m <= self.config.max_return_m) {
+            } else if point.miss_m.is_nan() || point.miss_m > self.config.max_return_m {
                 counts.not_returned += 1;
             } else if !in_unit_box(in_unit) {
                 counts.outside_box += 1;

@@ -3,7 +3,7 @@
 use effigy_fusion::mesh::{closest_point::ClosestPoint, normals::vertex_normals};
 
 use super::*;
-use crate::testing::{Suit, everyday_poses, standing};
+use crate::testing::{CAMERA, Suit, everyday_poses, standing};
 
 fn canonicaliser(suit: &Suit) -> Canonicaliser {
     Canonicaliser::new(
@@ -12,6 +12,7 @@ fn canonicaliser(suit: &Suit) -> Canonicaliser {
         CanonicaliseConfig::default(),
     )
     .unwrap()
+    .with_camera(&CameraModel::from(CAMERA))
 }
 
 /// Distances in metres, sorted, signed by the truth surface.
@@ -32,7 +33,9 @@ fn surface_points_land_on_the_canonical_surface_within_millimetres() {
         let frame = suit.frame(params, number as u64);
         let (samples, counts) = canonicaliser(&suit).process(&frame).unwrap();
         let mut errors = signed_m(&suit, &samples, &samples.points_in_unit);
-        errors.iter_mut().for_each(|error| *error = error.abs());
+        for error in &mut errors {
+            *error = error.abs();
+        }
         errors.sort_by(f32::total_cmp);
         let mean = errors.iter().sum::<f32>() / errors.len() as f32;
         let p95 = errors[errors.len() * 95 / 100];
