@@ -7,7 +7,24 @@ pub mod error;
 pub mod motion;
 pub mod registered;
 pub mod smpl;
+pub mod track;
 
+mod align;
+mod correspond;
+mod fit;
+mod initialize;
+mod observe;
+mod prior;
+mod residual;
+mod solve;
+mod state;
+mod surface;
+mod world;
+
+pub use align::EnergyConfig;
 pub use error::RegistrationError;
+pub use fit::FitConfig;
+pub use initialize::InitializeConfig;
 pub use registered::{RegisteredFrame, Tracking};
 pub use smpl::{BodyModel, BodyParams, PosedBody};
+pub use track::{TrackConfig, Tracker};

@@ -1,0 +1,298 @@
+//! Rounds of matching and moving: brings a posed body onto one observation.
+
+use effigy_capture::Rigid3;
+use glam::Vec3;
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    correspond::{
+        Agreement, Contradictions, MatchConfig, Renderer, Visibility, contradictions, match_points,
+    },
+    observe::{DataPoint, Observation},
+    residual::{
+        ClothSide, DepthPush, FloorTerm, JointLimits, Match, PointToPlane, PosePrior, Silhouette,
+        Temporal, Term,
+    },
+    smpl::JOINT_COUNT,
+    solve::{Damping, Termination, take_step},
+    state::BodyState,
+    surface::{PosedSurface, ShapedSurface, Surface},
+};
+
+/// How the terms weigh against each other. Each weight counts independent measurements: neighbouring pixels share
+/// their errors (cloth, calibration), so all of a body's depth points together are worth a few hundred.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct EnergyConfig {
+    /// What all depth points together are worth.
+    pub data_weight: f32,
+    /// A depth point this far outside the body costs one: clothes stand off the skin by this order.
+    pub cloth_outside_m: f32,
+    /// A depth point this far inside the body costs one: clothes are never there, noise and model errors are.
+    pub cloth_inside_m: f32,
+    /// Farther points belong to something else.
+    pub outlier_m: f32,
+    /// How far matches reach.
+    pub reach_m: f32,
+    /// A radian between the normals counts like this much distance in matching.
+    pub direction_m: f32,
+    /// What all vertices together are worth if they contradict the silhouette or the depth.
+    pub contradiction_weight: f32,
+    /// A vertex this far outside the silhouette, or in front of the depth, costs one.
+    pub contradiction_m: f32,
+    /// How far the mask's rim is worn, so that less than this outside is no contradiction.
+    pub silhouette_slack_m: f32,
+    pub pose_prior_weight: f32,
+    pub temporal_weight: f32,
+    /// A joint's turn against the prediction that costs one.
+    pub temporal_rotation_rad: f32,
+    pub temporal_trans_m: f32,
+    pub floor_m: f32,
+    pub joint_limit_rad: f32,
+}
+
+impl Default for EnergyConfig {
+    fn default() -> Self {
+        Self {
+            data_weight: 400.0,
+            cloth_outside_m: 0.020,
+            cloth_inside_m: 0.008,
+            outlier_m: 0.08,
+            reach_m: 0.25,
+            direction_m: 0.08,
+            contradiction_weight: 400.0,
+            contradiction_m: 0.02,
+            silhouette_slack_m: 0.012,
+            pose_prior_weight: 0.5,
+            temporal_weight: 1.0,
+            temporal_rotation_rad: 0.25,
+            temporal_trans_m: 0.05,
+            floor_m: 0.01,
+            joint_limit_rad: 0.05,
+        }
+    }
+}
+
+/// What is known besides the picture.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Context<'a> {
+    pub(crate) energy: &'a EnergyConfig,
+    pub(crate) predicted: Option<&'a BodyState>,
+    pub(crate) grounded: bool,
+}
+
+/// How long to try, and how carefully to look.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Effort {
+    pub(crate) rounds: usize,
+    /// Use only every n-th depth point.
+    pub(crate) every: usize,
+    /// Self-occlusion by drawing, or only by facing.
+    pub(crate) drawn_visibility: bool,
+    /// Factor on reach and outlier scale in the first round; it falls to one in the last.
+    pub(crate) widen: f32,
+}
+
+/// A body brought onto an observation.
+#[derive(Clone, Debug)]
+pub(crate) struct Aligned {
+    pub(crate) state: BodyState,
+    pub(crate) agreement: Agreement,
+    /// Of the inlier points to the surface.
+    pub(crate) residual_rms_m: f32,
+    pub(crate) joint_confidence: [f32; JOINT_COUNT],
+    pub(crate) termination: Termination,
+    pub(crate) rounds: usize,
+}
+
+/// Everything that a round's terms borrow.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Evidence {
+    pub(crate) matches: Vec<Match>,
+    contradictions: Contradictions,
+    floor_vertices: Vec<u32>,
+    point_count: usize,
+    widen: f32,
+}
+
+/// Moves the body from `start` towards the observation.
+pub(crate) fn align(
+    shaped: &ShapedSurface,
+    start: &BodyState,
+    observation: &Observation,
+    context: &Context<'_>,
+    effort: &Effort,
+) -> Aligned {
+    let mut renderer = Renderer::new(&observation.view);
+    let mut evidence = Evidence::default();
+    let mut body = PosedSurface::new(shaped, start);
+    let mut damping = Damping::default();
+    let mut termination = Termination::Singular;
+    let mut visibility = Visibility::default();
+    let points = thinned(&observation.points, effort.every);
+    let mut rounds = 0;
+    while rounds < effort.rounds {
+        // What is hidden changes little from round to round, and drawing costs as much as matching.
+        if rounds % 2 == 0 {
+            visibility = if effort.drawn_visibility {
+                renderer.visibility(&body, &observation.view)
+            } else {
+                Visibility::by_facing(&body, camera_in_world(observation).translation)
+            };
+        }
+        let progress = rounds as f32 / (effort.rounds - 1).max(1) as f32;
+        evidence.widen = effort.widen + (1.0 - effort.widen) * progress;
+        evidence.gather(&body, &visibility, observation, &points, context);
+        let outcome = evidence.with_terms(observation, context, |terms| {
+            take_step(body, terms, &mut damping)
+        });
+        (body, termination) = outcome;
+        rounds += 1;
+        if !termination.may_go_on() {
+            break;
+        }
+    }
+    Aligned {
+        state: body.state,
+        agreement: renderer.agreement(&body, &observation.view),
+        residual_rms_m: rms_m(&body, &evidence.matches, context.energy.outlier_m),
+        joint_confidence: joint_confidence(&shaped.surface, &evidence.matches, points.len()),
+        termination,
+        rounds,
+    }
+}
+
+impl Evidence {
+    /// Looks for matches and contradictions of the body as it stands.
+    pub(crate) fn gather(
+        &mut self,
+        body: &PosedSurface<'_>,
+        visibility: &Visibility,
+        observation: &Observation,
+        points: &[DataPoint],
+        context: &Context<'_>,
+    ) {
+        let energy = context.energy;
+        let matching = MatchConfig {
+            reach_m: energy.reach_m * self.widen.max(1.0),
+            direction_m: energy.direction_m,
+        };
+        self.point_count = points.len();
+        match_points(points, body, visibility, &matching, &mut self.matches);
+        let slack_cells = slack_cells(observation, energy);
+        contradictions(
+            body,
+            visibility,
+            &observation.view,
+            slack_cells,
+            &mut self.contradictions,
+        );
+        if self.floor_vertices.is_empty() && context.grounded {
+            self.floor_vertices = foot_vertices(&body.shaped.surface);
+        }
+    }
+
+    /// Hands all terms over what was gathered to `use_terms`.
+    pub(crate) fn with_terms<R>(
+        &self,
+        observation: &Observation,
+        context: &Context<'_>,
+        use_terms: impl FnOnce(&[&dyn Term]) -> R,
+    ) -> R {
+        let energy = context.energy;
+        let widen = self.widen.max(1.0);
+        let data = PointToPlane {
+            matches: &self.matches,
+            cloth: ClothSide {
+                outside_m: energy.cloth_outside_m,
+                inside_m: energy.cloth_inside_m,
+                outlier_m: energy.outlier_m * widen,
+            },
+            weight: energy.data_weight / self.point_count.max(1) as f32,
+        };
+        let per_vertex = energy.contradiction_weight / 1000.0;
+        let camera = camera_in_world(observation);
+        let silhouette = Silhouette {
+            pulls: &self.contradictions.pulls,
+            view: &observation.view,
+            slack_cells: slack_cells(observation, energy),
+            sigma_m: energy.contradiction_m,
+            outlier_m: 0.15 * widen,
+            weight: per_vertex,
+        };
+        let push = DepthPush {
+            pushes: &self.contradictions.pushes,
+            axis_in_world: camera.rotate(Vec3::Z),
+            camera_in_world: camera.translation,
+            sigma_m: energy.contradiction_m,
+            outlier_m: 0.15 * widen,
+            weight: 0.5 * per_vertex,
+        };
+        let floor =
+            FloorTerm { vertices: &self.floor_vertices, sigma_m: energy.floor_m, weight: 0.05 };
+        let prior = PosePrior { weight: energy.pose_prior_weight };
+        let limits = JointLimits { sigma_rad: energy.joint_limit_rad };
+        let temporal = context.predicted.map(|predicted| Temporal {
+            predicted,
+            rotation_sigma_rad: energy.temporal_rotation_rad,
+            trans_sigma_m: energy.temporal_trans_m,
+            weight: energy.temporal_weight,
+        });
+        let mut terms: Vec<&dyn Term> = vec![&data, &silhouette, &push, &prior, &limits];
+        if context.grounded {
+            terms.push(&floor);
+        }
+        if let Some(temporal) = &temporal {
+            terms.push(temporal);
+        }
+        use_terms(&terms)
+    }
+}
+
+pub(crate) fn thinned(points: &[DataPoint], every: usize) -> Vec<DataPoint> {
+    points.iter().step_by(every.max(1)).copied().collect()
+}
+
+pub(crate) fn camera_in_world(observation: &Observation) -> Rigid3 {
+    observation.view.camera_from_world.inverse()
+}
+
+fn slack_cells(observation: &Observation, energy: &EnergyConfig) -> f32 {
+    let depth_m = (observation.view.camera_from_world * observation.extent.center).z;
+    (energy.silhouette_slack_m / observation.view.metres_per_cell(depth_m.max(0.1))).max(0.75)
+}
+
+/// Vertices carried by ankles and feet.
+fn foot_vertices(surface: &Surface) -> Vec<u32> {
+    (0..surface.vertices.len())
+        .filter(|&v| matches!(surface.main_bone(v), 7 | 8 | 10 | 11))
+        .map(|v| v as u32)
+        .collect()
+}
+
+fn rms_m(body: &PosedSurface<'_>, matches: &[Match], outlier_m: f32) -> f32 {
+    let (mut sum, mut count) = (0.0_f64, 0_u32);
+    for found in matches {
+        let distance_m = found
+            .normal
+            .dot(found.point - body.vertices[found.vertex as usize]);
+        if distance_m.abs() < outlier_m {
+            sum += f64::from(distance_m * distance_m);
+            count += 1;
+        }
+    }
+    (sum / f64::from(count.max(1))).sqrt() as f32
+}
+
+/// From how much of each bone is matched: a thousandth of all points on a bone shows it somewhat, a hundredth well.
+fn joint_confidence(surface: &Surface, matches: &[Match], points: usize) -> [f32; JOINT_COUNT] {
+    let mut on_bone = [0.0_f32; JOINT_COUNT];
+    for found in matches {
+        let weights = &surface.skinning[found.vertex as usize];
+        for (&bone, &weight) in weights.bones.iter().zip(&weights.weights) {
+            on_bone[bone as usize] += weight * found.trust;
+        }
+    }
+    let enough = 0.005 * points.max(1) as f32;
+    on_bone.map(|seen| 1.0 - (-seen / enough).exp())
+}

@@ -1,0 +1,244 @@
+//! Shape from several frames: one set of betas and a pose a frame, fitted together, inside the clothes.
+
+use serde::{Deserialize, Serialize};
+use std::sync::Arc;
+
+use crate::{
+    align::{Context, EnergyConfig, Evidence, thinned},
+    correspond::Renderer,
+    observe::Observation,
+    residual::{ShapePrior, Term as _},
+    solve::{NormalEquations, shorten},
+    state::{ALL_UNKNOWNS, BETA_COUNT, BodyState, POSE_UNKNOWNS},
+    surface::{PosedSurface, ShapedSurface, Surface},
+};
+
+/// When and from what the shape is estimated.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct FitConfig {
+    /// Frames fitted together.
+    pub frames: usize,
+    /// Time after the first track at which the betas are estimated (again); after the last they are frozen.
+    pub moments_secs: Vec<f32>,
+    /// Frames kept for fitting are at least this far apart.
+    pub spacing_secs: f32,
+    /// Rounds of each estimate; each call of the tracker does one.
+    pub rounds: usize,
+    /// Use only every n-th depth point of the stored frames.
+    pub every: usize,
+    /// How much the betas' standard normal prior counts, in independent measurements.
+    pub shape_prior_weight: f32,
+}
+
+impl Default for FitConfig {
+    fn default() -> Self {
+        Self {
+            frames: 8,
+            moments_secs: vec![0.35, 1.2, 2.5, 4.5],
+            spacing_secs: 0.12,
+            rounds: 6,
+            every: 3,
+            shape_prior_weight: 2.0,
+        }
+    }
+}
+
+/// The frames stored, and the estimate in progress.
+#[derive(Clone, Debug)]
+pub(crate) struct ShapeFit {
+    surface: Arc<Surface>,
+    views: Vec<StoredView>,
+    last_stored_secs: f32,
+    next_moment: usize,
+    running: Option<Estimate>,
+}
+
+#[derive(Clone, Debug)]
+struct StoredView {
+    observation: Observation,
+    state: BodyState,
+}
+
+#[derive(Clone, Debug)]
+struct Estimate {
+    betas: [f32; BETA_COUNT],
+    rounds_done: usize,
+}
+
+/// What [`ShapeFit::advance`] needs to know of the frame it is called in.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Moment<'a> {
+    /// Since the first track.
+    pub(crate) secs: f32,
+    pub(crate) observation: &'a Observation,
+    pub(crate) state: &'a BodyState,
+    /// Whether the frame is tracked well enough to learn from.
+    pub(crate) good: bool,
+}
+
+impl ShapeFit {
+    pub(crate) fn new(surface: Arc<Surface>) -> Self {
+        Self {
+            surface,
+            views: Vec::new(),
+            last_stored_secs: f32::MIN,
+            next_moment: 0,
+            running: None,
+        }
+    }
+
+    /// Whether the betas stay as they are from now on.
+    pub(crate) fn is_frozen(&self, config: &FitConfig) -> bool {
+        self.next_moment >= config.moments_secs.len() && self.running.is_none()
+    }
+
+    /// Stores the frame if it is worth it and works on the estimate; returns new betas when there are some.
+    pub(crate) fn advance(
+        &mut self,
+        moment: &Moment<'_>,
+        config: &FitConfig,
+        energy: &EnergyConfig,
+        grounded: bool,
+    ) -> Option<[f32; BETA_COUNT]> {
+        if self.is_frozen(config) {
+            self.views = Vec::new();
+            return None;
+        }
+        if self.running.is_none() {
+            self.store(moment, config);
+            let due = moment.secs >= config.moments_secs[self.next_moment];
+            if due && self.views.len() >= 3.min(config.frames) {
+                self.next_moment += 1;
+                self.running = Some(Estimate { betas: moment.state.betas, rounds_done: 0 });
+            }
+            return None;
+        }
+        let context = Context { energy, predicted: None, grounded };
+        self.round(config, &context);
+        let running = self.running.as_ref()?;
+        if running.rounds_done < config.rounds {
+            return None;
+        }
+        let betas = running.betas;
+        self.running = None;
+        Some(betas)
+    }
+
+    /// Follows the world when it moves.
+    pub(crate) fn move_by(&mut self, new_from_old: effigy_capture::Rigid3, pelvis: glam::Vec3) {
+        for view in &mut self.views {
+            view.observation.move_by(new_from_old);
+            view.state = view.state.seen_from(new_from_old, pelvis);
+        }
+    }
+
+    fn store(&mut self, moment: &Moment<'_>, config: &FitConfig) {
+        if !moment.good || moment.secs < self.last_stored_secs + config.spacing_secs {
+            return;
+        }
+        self.last_stored_secs = moment.secs;
+        self.views
+            .push(StoredView { observation: moment.observation.clone(), state: *moment.state });
+        if self.views.len() > config.frames {
+            let least_new = self.most_redundant();
+            self.views.remove(least_new);
+        }
+    }
+
+    /// The view whose pose is nearest to another one's: it teaches least.
+    fn most_redundant(&self) -> usize {
+        let mut found = (0, f32::MAX);
+        for a in 0..self.views.len() {
+            for b in 0..a {
+                let distance = novelty(&self.views[a].state, &self.views[b].state);
+                if distance < found.1 {
+                    // The older of the two goes.
+                    found = (b, distance);
+                }
+            }
+        }
+        found.0
+    }
+
+    /// One Gauss-Newton step of all poses and the betas: each pose is eliminated from its frame's system.
+    fn round(&mut self, config: &FitConfig, context: &Context<'_>) {
+        let Some(running) = &mut self.running else {
+            return;
+        };
+        running.rounds_done += 1;
+        let shaped = ShapedSurface::new(Arc::clone(&self.surface), running.betas);
+        let mut sum = NormalEquations::new(BETA_COUNT);
+        let mut eliminated = Vec::with_capacity(self.views.len());
+        for view in &self.views {
+            let part = linearise(view, &shaped, config, context).eliminate(
+                POSE_UNKNOWNS,
+                RELATIVE_DAMPING,
+                1e-3,
+            );
+            if let Some(part) = &part {
+                sum.add(&part.rest);
+            }
+            eliminated.push(part);
+        }
+        sum.add(&prior(&shaped, running.betas, config));
+        let Some(mut betas_step) = sum.solve(RELATIVE_DAMPING, 1e-6) else {
+            return;
+        };
+        shorten(&mut betas_step);
+        for (beta, &step) in running.betas.iter_mut().zip(&betas_step) {
+            *beta = (*beta + step as f32).clamp(-4.0, 4.0);
+        }
+        for (view, part) in self.views.iter_mut().zip(&eliminated) {
+            if let Some(part) = part {
+                let mut step = part.first_step(&betas_step);
+                shorten(&mut step);
+                view.state = view.state.moved_by(&step);
+            }
+            view.state.betas = running.betas;
+        }
+    }
+}
+
+/// Keeps steps inside the region where matches still mean something.
+const RELATIVE_DAMPING: f64 = 1e-2;
+
+fn linearise(
+    view: &StoredView,
+    shaped: &ShapedSurface,
+    config: &FitConfig,
+    context: &Context<'_>,
+) -> NormalEquations {
+    let observation = &view.observation;
+    let body = PosedSurface::new(shaped, &view.state).with_shape_derivatives();
+    let visibility = Renderer::new(&observation.view).visibility(&body, &observation.view);
+    let mut evidence = Evidence::default();
+    let points = thinned(&observation.points, config.every);
+    evidence.gather(&body, &visibility, observation, &points, context);
+    evidence.with_terms(observation, context, |terms| {
+        let mut system = NormalEquations::new(ALL_UNKNOWNS);
+        for term in terms {
+            term.emit(&body, &mut system);
+        }
+        system
+    })
+}
+
+/// The shape prior as a system of the betas alone.
+fn prior(shaped: &ShapedSurface, betas: [f32; BETA_COUNT], config: &FitConfig) -> NormalEquations {
+    let term = ShapePrior { mean: [0.0; BETA_COUNT], weight: config.shape_prior_weight };
+    let state = BodyState { betas, ..BodyState::REST };
+    let mut whole = NormalEquations::new(ALL_UNKNOWNS);
+    term.emit(&PosedSurface::new(shaped, &state), &mut whole);
+    whole.tail(POSE_UNKNOWNS)
+}
+
+/// How differently two poses show a body: heading above all, then limbs.
+fn novelty(a: &BodyState, b: &BodyState) -> f32 {
+    let turn = |joint: usize| a.rotations[joint].angle_between(b.rotations[joint]);
+    let limbs: f32 = [1, 2, 4, 5, 16, 17, 18, 19]
+        .iter()
+        .map(|&joint| turn(joint))
+        .sum();
+    2.0 * turn(0) + 0.25 * limbs
+}

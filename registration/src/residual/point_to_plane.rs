@@ -1,0 +1,69 @@
+//! Depth points pull the body's surface towards them, along the normal.
+
+use glam::Vec3;
+
+use super::{ClothSide, Row, RowSink, Term};
+use crate::surface::PosedSurface;
+
+/// A depth point and the vertex it is believed to lie on; world space.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Match {
+    pub(crate) vertex: u32,
+    pub(crate) point: Vec3,
+    /// The mean of the depth's and the body's normal at the time of matching, outwards (Rusinkiewicz 2019: the
+    /// chord between two points of a circle is at right angles to it, so curved limbs pull true).
+    pub(crate) normal: Vec3,
+    pub(crate) sigma_m: f32,
+    /// Trust in the match itself, 0 to 1.
+    pub(crate) trust: f32,
+}
+
+/// `sum w(r) r^2`, `r = n . (p - x)`, positive where the point is outside the body.
+#[derive(Clone, Debug)]
+pub(crate) struct PointToPlane<'a> {
+    pub(crate) matches: &'a [Match],
+    pub(crate) cloth: ClothSide,
+    /// How many independent measurements one match is worth: neighbours share their errors.
+    pub(crate) weight: f32,
+}
+
+impl Term for PointToPlane<'_> {
+    fn emit(&self, body: &PosedSurface<'_>, sink: &mut dyn RowSink) {
+        let mut row = Row::new(0.0, 0.0);
+        for found in self.matches {
+            let vertex = found.vertex as usize;
+            let distance_m = found.normal.dot(found.point - body.vertices[vertex]);
+            let (weight, cost) = self.cloth.weight_and_cost(distance_m, found.sigma_m);
+            let scale = self.weight * found.trust;
+            row.restart(distance_m, weight * scale, cost * scale);
+            if sink.wants_derivatives() {
+                body.add_vertex(&mut row, vertex, -found.normal);
+            }
+            sink.take(&row);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::residual::checker;
+
+    #[test]
+    fn derivatives_agree_with_finite_differences() {
+        let shaped = checker::test_surface();
+        let body = PosedSurface::new(&shaped, &checker::test_state());
+        let matches: Vec<Match> = (0..400)
+            .step_by(7)
+            .map(|vertex| Match {
+                vertex,
+                point: body.vertices[vertex as usize] + Vec3::new(0.01, 0.02, 0.03),
+                normal: Vec3::new(0.3, 0.5, 0.8).normalize_or_zero(),
+                sigma_m: 0.003,
+                trust: 1.0,
+            })
+            .collect();
+        let cloth = ClothSide { outside_m: 0.02, inside_m: 0.008, outlier_m: 0.06 };
+        checker::assert_derivatives(&PointToPlane { matches: &matches, cloth, weight: 1.0 });
+    }
+}

@@ -1,0 +1,143 @@
+//! The body's surface as tracking sees it: a few thousand of the model's vertices, evenly spread.
+//!
+//! A [`Surface`] is chosen once for a model, [`ShapedSurface`] once for each set of betas, and
+//! [`PosedSurface`] anew for each pose the solver tries.
+
+mod decimate;
+mod posed;
+mod shaped;
+
+pub(crate) use posed::PosedSurface;
+pub(crate) use shaped::ShapedSurface;
+
+use std::sync::Arc;
+
+use glam::Vec3;
+
+use crate::smpl::{BodyModel, JOINT_COUNT, PARENTS, PoseDirection, VertexWeights};
+
+/// A coarse stand-in for a body model's surface that keeps its vertices' own shape, pose and skinning data.
+#[derive(Clone, Debug)]
+pub(crate) struct Surface {
+    pub(crate) model: Arc<BodyModel>,
+    /// The model's vertex behind each of ours.
+    pub(crate) vertices: Vec<u32>,
+    pub(crate) triangles: Vec<[u32; 3]>,
+    pub(crate) skinning: Vec<VertexWeights>,
+    /// For each vertex the joints that move it.
+    pub(crate) influences: Vec<Influences>,
+    pub(crate) pose_dirs: Vec<PoseDirection>,
+}
+
+/// The joints that move a vertex, in ascending order, each with a mask of the vertex's bones it carries.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Influences {
+    pub(crate) count: u8,
+    pub(crate) joints: [u8; MAX_INFLUENCES],
+    pub(crate) bone_masks: [u8; MAX_INFLUENCES],
+}
+
+/// Four bones with all their ancestors share the trunk, so they never come to more.
+pub(crate) const MAX_INFLUENCES: usize = JOINT_COUNT;
+
+impl Surface {
+    /// Spreads `vertex_count` vertices evenly over the model's template.
+    pub(crate) fn new(model: Arc<BodyModel>, vertex_count: usize) -> Self {
+        let coarse = decimate::decimate(&model.template, &model.triangles, vertex_count);
+        let skinning: Vec<VertexWeights> = coarse
+            .vertices
+            .iter()
+            .map(|&v| model.skinning[v as usize])
+            .collect();
+        let influences = skinning.iter().map(Influences::new).collect();
+        let pose_dirs = restrict(&model.pose_dirs, &coarse.vertices, model.vertex_count());
+        Self {
+            vertices: coarse.vertices,
+            triangles: coarse.triangles,
+            skinning,
+            influences,
+            pose_dirs,
+            model,
+        }
+    }
+
+    /// The bone that carries most of a vertex.
+    pub(crate) fn main_bone(&self, vertex: usize) -> usize {
+        let weights = &self.skinning[vertex];
+        let mut best = 0;
+        for slot in 1..4 {
+            if weights.weights[slot] > weights.weights[best] {
+                best = slot;
+            }
+        }
+        weights.bones[best] as usize
+    }
+}
+
+impl Influences {
+    fn new(weights: &VertexWeights) -> Self {
+        let mut masks = [0_u8; JOINT_COUNT];
+        for slot in 0..4 {
+            if weights.weights[slot] <= 0.0 {
+                continue;
+            }
+            let mut joint = weights.bones[slot] as usize;
+            loop {
+                masks[joint] |= 1 << slot;
+                if joint == 0 {
+                    break;
+                }
+                joint = PARENTS[joint];
+            }
+        }
+        let mut influences = Self::default();
+        for (joint, &mask) in masks.iter().enumerate().filter(|(_, mask)| **mask != 0) {
+            let next = influences.count as usize;
+            influences.joints[next] = joint as u8;
+            influences.bone_masks[next] = mask;
+            influences.count += 1;
+        }
+        influences
+    }
+}
+
+/// The pose directions of the chosen vertices only.
+fn restrict(
+    directions: &[PoseDirection],
+    chosen: &[u32],
+    vertex_count: usize,
+) -> Vec<PoseDirection> {
+    let mut ours = vec![u32::MAX; vertex_count];
+    for (i, &vertex) in chosen.iter().enumerate() {
+        ours[vertex as usize] = i as u32;
+    }
+    /// Offsets below this move nothing visibly: a hundredth of a millimetre a unit.
+    const NEGLIGIBLE_M: f32 = 1e-5;
+    directions
+        .iter()
+        .map(|direction| {
+            let mut kept = PoseDirection::default();
+            for (&vertex, &offset) in direction.vertices.iter().zip(&direction.offsets) {
+                let index = ours[vertex as usize];
+                if index != u32::MAX && offset.length_squared() > NEGLIGIBLE_M * NEGLIGIBLE_M {
+                    kept.vertices.push(index);
+                    kept.offsets.push(offset);
+                }
+            }
+            kept
+        })
+        .collect()
+}
+
+/// Area-weighted vertex normals; zero where a vertex has no triangles.
+pub(crate) fn vertex_normals(vertices: &[Vec3], triangles: &[[u32; 3]]) -> Vec<Vec3> {
+    let mut normals = vec![Vec3::ZERO; vertices.len()];
+    for triangle in triangles {
+        let [a, b, c] = triangle.map(|i| vertices[i as usize]);
+        let area_normal = (b - a).cross(c - a);
+        for &i in triangle {
+            normals[i as usize] += area_normal;
+        }
+    }
+    normals.iter().map(|n| n.normalize_or_zero()).collect()
+}
