@@ -175,11 +175,8 @@ impl Cleaner {
         );
         self.bilateral
             .smooth(depth, region, person, &self.tolerance);
-        for y in region.rows.clone() {
-            let row = y * depth.width;
-            for pixel in row + region.columns.start..row + region.columns.end {
-                person[pixel] &= !depth.metres[pixel].is_nan();
-            }
+        for (person, depth_m) in person.iter_mut().zip(&depth.metres) {
+            *person &= !depth_m.is_nan();
         }
         let filled = fill::fill_holes(depth, person, region, &self.tolerance, &self.config.fill);
         for &Filled { pixel, depth_m } in &filled {
@@ -193,10 +190,9 @@ impl Cleaner {
         let mut vertices = VertexMap::empty(depth.width, depth.height);
         for y in region.rows.clone() {
             let row = y * depth.width;
-            for pixel in row + region.columns.start..row + region.columns.end {
-                if person[pixel] {
-                    vertices.points[pixel] = self.rays.point(pixel, depth.metres[pixel]);
-                }
+            let columns = row + region.columns.start..row + region.columns.end;
+            for pixel in columns.filter(|&pixel| person[pixel]) {
+                vertices.points[pixel] = self.rays.point(pixel, depth.metres[pixel]);
             }
         }
         vertices

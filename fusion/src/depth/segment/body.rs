@@ -7,6 +7,7 @@ use super::{
     super::tolerance::Tolerance,
     coarse::Coarse,
     label::{Labels, NO_LABEL},
+    planarity, split,
 };
 use crate::clean::FloorPlane;
 
@@ -30,10 +31,20 @@ pub struct BodyConfig {
     /// nearer than a body to be taken for one.
     pub low_penalty_m: f32,
     pub low_below_m: f32,
+    /// Share of a part on one plane (within a distance, and 1.5 sigma) that makes it doubtful or impossible
+    /// as a person: real backs and coats reach 0.5. Not judged where noise widens the band too far.
+    pub flat_share: [f32; 2],
+    pub flat_within_m: f32,
+    pub judge_flatness_below_m: f32,
+    /// A doubtful part must be this much nearer than a body to be taken for one.
+    pub flat_penalty_m: f32,
     /// The followed person is looked for within this distance of where they were.
     pub follow_within_m: f32,
     /// Frames to wait for the followed person before following another.
     pub wait_frames: u32,
+    /// A part at least this large, and not wider than a group of people, may be several.
+    pub crowd_area_m2: f32,
+    pub max_crowd_width_m: f32,
     /// Parts a body owns though a step in depth divides them: their largest share of its size, and how far
     /// they may be behind and before it.
     pub max_fragment_share: f32,
@@ -52,8 +63,14 @@ impl Default for BodyConfig {
             max_clearance_m: 1.2,
             low_penalty_m: 2.0,
             low_below_m: 1.1,
+            flat_share: [0.57, 0.75],
+            flat_within_m: 0.01,
+            judge_flatness_below_m: 0.03,
+            flat_penalty_m: 3.0,
             follow_within_m: 0.6,
             wait_frames: 15,
+            crowd_area_m2: 0.6,
+            max_crowd_width_m: 4.0,
             max_fragment_share: 0.3,
             fragment_behind_m: 0.15,
             fragment_before_m: 0.5,
@@ -86,6 +103,7 @@ struct Moments {
     right_m: f32,
     at_border: bool,
     heights_m: Vec<f32>,
+    points: Vec<Vec3>,
 }
 
 pub(super) fn find(
@@ -95,7 +113,16 @@ pub(super) fn find(
     tolerance: &Tolerance,
     config: &BodyConfig,
 ) -> Vec<Body> {
-    let moments = measure(coarse, labels, floor, tolerance);
+    let mut moments = measure(coarse, labels, floor, tolerance);
+    let mut several = false;
+    for (label, moments) in moments.iter().enumerate() {
+        let crowded = moments.area_m2 > config.crowd_area_m2
+            && moments.right_m - moments.left_m <= config.max_crowd_width_m;
+        several |= crowded && split::split_people(coarse, labels, label as u32, floor);
+    }
+    if several {
+        moments = measure(coarse, labels, floor, tolerance);
+    }
     moments
         .into_iter()
         .enumerate()
@@ -140,12 +167,14 @@ impl Default for Moments {
             right_m: f32::NEG_INFINITY,
             at_border: false,
             heights_m: Vec::new(),
+            points: Vec::new(),
         }
     }
 }
 
 impl Moments {
     fn add(&mut self, point: Vec3, area_m2: f32, rim: bool) {
+        self.points.push(point);
         let wide = point.as_dvec3();
         self.count += 1.0;
         self.area_m2 += area_m2;
@@ -165,7 +194,7 @@ impl Moments {
         config: &BodyConfig,
     ) -> Option<Body> {
         let within = |range: [f32; 2], value: f32| (range[0]..=range[1]).contains(&value);
-        if !within(config.area_m2, self.area_m2) {
+        if self.count == 0.0 || !within(config.area_m2, self.area_m2) {
             return None;
         }
         let width_m = self.right_m - self.left_m;
@@ -181,15 +210,37 @@ impl Moments {
             && thickness2 >= min_thickness2
             && breadth2 >= config.min_breadth_m * config.min_breadth_m
             && !hangs;
+        if !fits {
+            return None;
+        }
         let low = height_m < config.low_below_m && !self.at_border;
-        let penalty_m = if low { config.low_penalty_m } else { 0.0 };
-        fits.then(|| Body {
+        let low_m = if low { config.low_penalty_m } else { 0.0 };
+        let flat_m = self.flat_penalty_m(tolerance.sigma_m(centroid.z), config)?;
+        Some(Body {
             label,
             centroid,
             area_m2: self.area_m2,
             span_m,
             width_m,
-            rank_m: centroid.length() + penalty_m,
+            rank_m: centroid.length() + low_m + flat_m,
+        })
+    }
+
+    /// What flatness speaks against this being a person; `None` if it cannot be one.
+    fn flat_penalty_m(&self, sigma_m: f32, config: &BodyConfig) -> Option<f32> {
+        let within_m = config.flat_within_m + 1.5 * sigma_m;
+        if within_m > config.judge_flatness_below_m {
+            return Some(0.0);
+        }
+        let share = planarity::flat_share(&self.points, within_m);
+        let [doubtful, impossible] = config.flat_share;
+        if share > impossible {
+            return None;
+        }
+        Some(if share > doubtful {
+            config.flat_penalty_m
+        } else {
+            0.0
         })
     }
 

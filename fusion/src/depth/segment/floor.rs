@@ -217,7 +217,7 @@ impl FloorFinder {
 impl FloorPlane {
     /// How far above the floor a point is.
     #[inline]
-    pub fn height_m(&self, point: Vec3) -> f32 {
+    pub fn height_m(self, point: Vec3) -> f32 {
         self.normal.dot(point) - self.offset_m
     }
 }

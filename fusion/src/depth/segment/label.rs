@@ -18,6 +18,8 @@ pub(super) const MAX_SLOPE: f32 = 4.0;
 pub(super) const STEP_SIGMAS: f32 = 4.0;
 /// The farthest cell that a hole is bridged to: sensors with dropouts cut bodies into pieces otherwise.
 const BRIDGE: usize = 3;
+/// The farthest cell that a limb is looked for across a hole: stereo leaves a shadow beside every near part.
+const LIMB_REACH: usize = 8;
 /// Fewer cells than this are noise.
 const MIN_CELLS: u32 = 12;
 /// Everything closer to the floor than this belongs to it, beside the noise.
@@ -43,8 +45,17 @@ impl Labels {
         self.cells[cell]
     }
 
+    /// Moves a cell to another part.
     pub(super) fn set(&mut self, cell: usize, label: u32) {
+        self.sizes[self.cells[cell] as usize] -= 1;
+        self.sizes[label as usize] += 1;
         self.cells[cell] = label;
+    }
+
+    /// A new part, without cells as yet.
+    pub(super) fn add(&mut self) -> u32 {
+        self.sizes.push(0);
+        self.sizes.len() as u32 - 1
     }
 
     pub(super) fn split(
@@ -149,9 +160,9 @@ impl Labels {
     /// of somebody seen from the side.
     pub(super) fn attach_fragments(&mut self, coarse: &Coarse, body: &Body, config: &BodyConfig) {
         let mut contacts = vec![0_u32; self.sizes.len()];
-        let region = self
-            .region_of(body.label, coarse)
-            .grown(BRIDGE, coarse.width, coarse.height);
+        let region =
+            self.region_of(body.label, coarse)
+                .grown(LIMB_REACH, coarse.width, coarse.height);
         for y in region.rows.clone() {
             for x in region.columns.clone() {
                 let cell = y * coarse.width + x;
@@ -178,7 +189,7 @@ impl Labels {
             .zip(&self.sizes)
             .map(|(&contacts, &size)| {
                 // A part that touches along a good share of its outline, not in passing.
-                size <= most && f64::from(contacts) > f64::from(size).sqrt()
+                size <= most && f64::from(contacts) > 0.5 * f64::from(size).sqrt()
             })
             .collect();
         for cell in &mut self.cells {
@@ -197,7 +208,7 @@ impl Labels {
         config: &BodyConfig,
     ) -> Option<u32> {
         let own = self.cells[cell];
-        let other = (1..=available.min(BRIDGE as isize))
+        let other = (1..=available.min(LIMB_REACH as isize))
             .map(|distance| cell.wrapping_add_signed(distance * step))
             .find(|&other| self.cells[other] != NO_LABEL)?;
         let label = self.cells[other];

@@ -7,6 +7,8 @@ mod body;
 mod coarse;
 mod floor;
 mod label;
+mod planarity;
+mod split;
 mod visibility;
 
 use glam::Vec3;
@@ -218,12 +220,12 @@ impl Segmenter {
         if agrees(own) {
             return true;
         }
-        let beside_x = if x % CELL_PX == 0 {
+        let beside_x = if x.is_multiple_of(CELL_PX) {
             cell_x.saturating_sub(1)
         } else {
             cell_x + 1
         };
-        let beside_y = if y % CELL_PX == 0 {
+        let beside_y = if y.is_multiple_of(CELL_PX) {
             cell_y.saturating_sub(1)
         } else {
             cell_y + 1

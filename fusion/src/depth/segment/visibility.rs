@@ -7,6 +7,10 @@ use crate::clean::{FloorPlane, PersonVisibility};
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
+#[expect(
+    clippy::struct_field_names,
+    reason = "they are all lengths, and units stand in names"
+)]
 pub struct VisibilityConfig {
     /// Feet end at most this far above the floor: ankles, where black shoes return nothing.
     pub feet_below_m: f32,
@@ -47,7 +51,12 @@ pub(super) struct ValidWindow {
 
 /// Metres of a body's outline along the sides of the image.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[expect(
+    clippy::struct_field_names,
+    reason = "they are all lengths, and units stand in names"
+)]
 pub(super) struct Contact {
+    /// Metres along the top, along the bottom, and along both sides together.
     top_m: f32,
     bottom_m: f32,
     sides_m: f32,
