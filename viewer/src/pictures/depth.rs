@@ -100,6 +100,17 @@ pub fn clean_picture(clean: &CleanFrame, range: DepthRange, framing: &Framing) -
     })
 }
 
+/// As [`clean_picture`] without colour: a ground to draw on.
+pub(super) fn relief_picture(clean: &CleanFrame, framing: &Framing) -> Picture {
+    draw(framing, [clean.depth.width, clean.depth.height], |index| {
+        if !clean.depth.metres[index].is_finite() {
+            return None;
+        }
+        let share = relief(&clean.normals, index) * if clean.person[index] { 0.8 } else { 0.12 };
+        Some(palette::mix(palette::PANEL, palette::TEXT, share))
+    })
+}
+
 /// Traces the edge of the person mask.
 pub fn outline_person(
     picture: &mut Picture,

@@ -28,7 +28,7 @@ impl HeatScale {
     }
 }
 
-/// A mesh coloured by one distance a vertex, with a legend in the lower left corner. A vertex whose
+/// A mesh coloured by one distance a vertex, with a legend in the upper left corner. A vertex whose
 /// distance is not finite is grey.
 pub fn heat_picture(
     mesh: MeshView<'_>,
@@ -51,7 +51,7 @@ pub fn draw_legend(picture: &mut Picture, scale: HeatScale) {
     let label = format!("{:.0} mm", scale.largest_m * 1000.0);
     let zero_px = text_width_px("0", LEGEND_CAP_PX);
     let left = 10 + zero_px as u32 + 6;
-    let top = picture.height().saturating_sub(10 + LEGEND_PX[1]);
+    let top = 10;
     for y in top..(top + LEGEND_PX[1]).min(picture.height()) {
         for x in left..(left + LEGEND_PX[0]).min(picture.width()) {
             let share = (x - left) as f32 / (LEGEND_PX[0] - 1) as f32;

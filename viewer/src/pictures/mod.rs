@@ -14,7 +14,7 @@ mod heat;
 mod mesh;
 mod overlay;
 pub mod palette;
-mod shade;
+pub(crate) mod shade;
 mod text;
 
 pub use camera::PictureCamera;

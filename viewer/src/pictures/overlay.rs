@@ -4,8 +4,8 @@ use effigy_capture::{Intrinsics, Rigid3};
 use effigy_fusion::CleanFrame;
 
 use super::{
-    DepthRange, Framing, MeshView, Picture, PictureCamera, clean_picture,
-    depth::outline,
+    Framing, MeshView, Picture, PictureCamera,
+    depth::{outline, relief_picture},
     palette::{self, mix, srgb_from_linear},
     shade::LitMesh,
 };
@@ -20,7 +20,7 @@ pub struct OverlayStyle {
 
 impl Default for OverlayStyle {
     fn default() -> Self {
-        Self { color: palette::BODY, opacity: 0.55 }
+        Self { color: palette::BODY, opacity: 0.6 }
     }
 }
 
@@ -33,7 +33,7 @@ pub fn body_over_depth(
     framing: &Framing,
     style: OverlayStyle,
 ) -> Picture {
-    let mut picture = clean_picture(clean, DepthRange::of(clean), framing);
+    let mut picture = relief_picture(clean, framing);
     let (intrinsics, world_from_camera) = sensor;
     let camera = PictureCamera::of_sensor(intrinsics, world_from_camera, framing);
     let lit = LitMesh::new(body, &camera, style.color);

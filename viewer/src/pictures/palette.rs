@@ -11,7 +11,7 @@ pub const TEXT_DIM: [u8; 3] = [146, 153, 164];
 /// The fitted body.
 pub const BODY: [u8; 3] = [82, 196, 208];
 /// The avatar, and the true surface beside it.
-pub const CLAY: [u8; 3] = [214, 203, 190];
+pub const CLAY: [u8; 3] = [206, 194, 180];
 pub const GOOD: [u8; 3] = [108, 196, 138];
 pub const WAITING: [u8; 3] = [232, 184, 92];
 pub const BAD: [u8; 3] = [228, 106, 98];

@@ -13,19 +13,23 @@ use super::{
 /// Samples a side of an output pixel.
 const SAMPLES: u32 = 2;
 /// Directions towards the lights in camera space (x right, y down, z forward), and their strengths.
-const KEY: Light = Light { towards: vec3(-0.52, -0.62, -0.59), strength: vec3(0.86, 0.83, 0.78) };
-const FILL: Light = Light { towards: vec3(0.80, -0.10, -0.59), strength: vec3(0.17, 0.20, 0.25) };
+pub(crate) const KEY: Light =
+    Light { towards: vec3(-0.66, -0.58, -0.48), strength: vec3(0.88, 0.85, 0.80) };
+pub(crate) const FILL: Light =
+    Light { towards: vec3(0.72, -0.08, -0.69), strength: vec3(0.15, 0.18, 0.23) };
 /// Light from everywhere, from the ground and from the sky.
-const GROUND: Vec3 = vec3(0.07, 0.065, 0.06);
-const SKY: Vec3 = vec3(0.17, 0.18, 0.20);
+pub(crate) const GROUND: Vec3 = vec3(0.045, 0.042, 0.04);
+pub(crate) const SKY: Vec3 = vec3(0.13, 0.14, 0.16);
+/// How far the key light reaches around the edge of the lit side.
+pub(crate) const WRAP: f32 = 0.12;
 /// A bright edge that parts the figure from the dark ground.
-const RIM: f32 = 0.16;
+pub(crate) const RIM: f32 = 0.16;
 /// What the deepest crevice keeps of its light.
 const CREVICE_FLOOR: f32 = 0.4;
 
-struct Light {
-    towards: Vec3,
-    strength: Vec3,
+pub(crate) struct Light {
+    pub(crate) towards: Vec3,
+    pub(crate) strength: Vec3,
 }
 
 /// How a mesh is drawn.
@@ -160,7 +164,6 @@ impl<'a> LitMesh<'a> {
 /// Lambert for the two lights, softened at the key light's terminator, and the rim; `normal` and the ray
 /// away from the camera are unit vectors in camera space.
 fn shade(normal: Vec3, away: Vec3) -> Vec3 {
-    const WRAP: f32 = 0.15;
     let key = ((normal.dot(KEY.towards) + WRAP) / (1.0 + WRAP)).max(0.0);
     let fill = normal.dot(FILL.towards).max(0.0);
     let up = 0.5 - 0.5 * normal.y;
