@@ -2,6 +2,8 @@
 
 use std::path::PathBuf;
 
+use crate::{hyper::HyperConfig, sdf::loss::LossTerms};
+
 #[derive(Debug, thiserror::Error)]
 pub enum AvatarError {
     #[error("{path}: {source}")]
@@ -38,4 +40,44 @@ pub enum AvatarError {
     EmptyBody,
     #[error("exporting glTF: {0}")]
     Export(String),
+    #[error("cannot start {count} training threads: {source}; ask for fewer")]
+    Threads { count: usize, source: rayon::ThreadPoolBuildError },
+    #[error("cannot write the network: {0}")]
+    WriteNetwork(safetensors::SafeTensorError),
+    #[error("network file is broken: {0}; copy or train it again")]
+    ReadNetwork(safetensors::SafeTensorError),
+    #[error("network file has format {found:?}, expected {expected:?}; it is of another version")]
+    NetworkFormat { expected: &'static str, found: String },
+    #[error("network file: metadata {key:?} cannot be read: {source}")]
+    NetworkMetadata { key: &'static str, source: serde_json::Error },
+    #[error("network file asks for {config:?}, which is beyond what we load")]
+    NetworkTooLarge { config: HyperConfig },
+    #[error("network file: tensor {name:?} has shape {found:?}, expected {expected:?}")]
+    TensorShape { name: String, expected: Vec<usize>, found: Vec<usize> },
+    #[error("network file: tensor {name:?} holds {found} numbers, expected F32 or F16")]
+    TensorType { name: String, found: String },
+    #[error("network file: tensor {name:?}, element {index} is not a finite number")]
+    TensorNotFinite { name: String, index: usize },
+    #[error("{path}: checkpoint cannot be used: {what}; delete it to start anew")]
+    Checkpoint { path: PathBuf, what: String },
+    #[error("cannot start the fine-tuning thread: {0}")]
+    Thread(std::io::Error),
+    #[error("the fine-tuning thread panicked; its message is on standard error")]
+    FineTunePanicked,
+    #[error("fine-tuning needs at least one keyframe, got none")]
+    NoKeyframes,
+    #[error(
+        "keyframe {keyframe} has {points} points, {normals} normals and {weights} weights; \
+         expected one of each a point"
+    )]
+    SampleCounts { keyframe: usize, points: usize, normals: usize, weights: usize },
+    #[error(
+        "keyframe {keyframe}: none of its {points} points passed the re-projection test; \
+         choose a frame with a better fit"
+    )]
+    EmptyKeyframe { keyframe: usize, points: usize },
+    #[error("keyframe {keyframe} holds numbers that are not finite")]
+    KeyframeNotFinite { keyframe: usize },
+    #[error("the loss is not finite at step {step} ({terms:?}); lower the rates")]
+    LossNotFinite { step: u32, terms: LossTerms },
 }

@@ -1,6 +1,19 @@
 //! Signed distance fields in unit space: positive outside, negative inside.
 
+pub mod batch;
+mod config;
+mod elementwise;
+mod field;
+mod kernel;
+pub mod loss;
+#[cfg(test)]
+mod plain;
+mod sincos;
+
 use glam::Vec3;
+
+pub use config::{OMEGA, SirenConfig};
+pub use field::SirenField;
 
 /// Anything that can be meshed and driven. Values are in unit-space lengths.
 pub trait SignedDistanceField: Sync {

@@ -1,0 +1,60 @@
+//! Settings of fine-tuning.
+
+use serde::{Deserialize, Serialize};
+
+pub use super::sampling::SamplingConfig;
+use crate::{hyper::RateConfig, nn::ThreadsConfig, sdf::loss::LossConfig};
+
+/// How a person is learned.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct FineTuneConfig {
+    pub seed: u64,
+    /// Adam steps, each over all keyframes.
+    pub steps: u32,
+    /// Steps over which the rates rise from zero: the moments are still empty.
+    pub warm_up_steps: u32,
+    /// The share of the steps at the end over which the rates fall to zero; the absolute values in the
+    /// loss keep a constant rate from settling.
+    pub decay_share: f32,
+    /// The share of each keyframe's points that is held out to measure the residual.
+    pub held_out_share: f32,
+    /// Steps between two measurements of the held-out residual.
+    pub held_out_every: u32,
+    /// What is drawn from a keyframe in a step.
+    pub sampling: SamplingConfig,
+    pub rates: RateConfig,
+    pub loss: LossConfig,
+    pub threads: ThreadsConfig,
+}
+
+impl Default for FineTuneConfig {
+    fn default() -> Self {
+        Self {
+            seed: 1,
+            steps: 400,
+            warm_up_steps: 10,
+            decay_share: 0.5,
+            held_out_share: 0.1,
+            held_out_every: 50,
+            sampling: SamplingConfig::default(),
+            rates: RateConfig::default(),
+            loss: LossConfig::default(),
+            threads: ThreadsConfig::default(),
+        }
+    }
+}
+
+impl FineTuneConfig {
+    /// The share of the rates at a step, counted from zero.
+    pub(crate) fn rate_share(&self, step: u32) -> f32 {
+        let warm = (step + 1) as f32 / self.warm_up_steps.max(1) as f32;
+        let left = self.steps.saturating_sub(step) as f32 / self.steps.max(1) as f32;
+        let decay = if self.decay_share > 0.0 {
+            left / self.decay_share
+        } else {
+            1.0
+        };
+        warm.min(1.0) * decay.min(1.0)
+    }
+}

@@ -1,0 +1,202 @@
+//! The stage itself: one Adam step over all keyframes at a time.
+
+use std::ops::ControlFlow;
+
+use glam::Vec3;
+use rand::{SeedableRng as _, rngs::StdRng};
+use serde::{Deserialize, Serialize};
+
+use super::{FineTuneConfig, sampling::KeyframePoints};
+use crate::{
+    CanonicalSamples, PoseInput, SignedDistanceField as _,
+    error::AvatarError,
+    hyper::{HyperNetwork, optimizer::HyperOptimizer},
+    sdf::{
+        SirenField,
+        batch::{FieldFrame, FieldGradients},
+        loss::{LossPoint, LossTerms},
+    },
+};
+
+/// Most held-out points a keyframe that a measurement evaluates.
+const HELD_OUT_POINTS: usize = 512;
+
+/// Where fine-tuning stands.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct FineTuneProgress {
+    /// Steps done, of `steps`.
+    pub step: u32,
+    pub steps: u32,
+    /// Loss of the last step.
+    pub loss: LossTerms,
+    /// Mean distance of the held-out points to the surface at the last measurement.
+    pub held_out_residual_m: f32,
+    pub elapsed_secs: f64,
+    pub left_secs: f64,
+}
+
+/// Fine-tunes until all steps are done, or until `on_progress` says to stop: the network learned so far is
+/// returned in either case. `clock` gives seconds from any origin.
+pub fn fine_tune(
+    network: HyperNetwork,
+    samples: &[CanonicalSamples],
+    metres_per_unit: f32,
+    config: &FineTuneConfig,
+    clock: &dyn Fn() -> f64,
+    on_progress: &mut dyn FnMut(&FineTuneProgress) -> ControlFlow<()>,
+) -> Result<HyperNetwork, AvatarError> {
+    let mut tuner = FineTuner::new(network, samples, metres_per_unit, config)?;
+    let start_secs = clock();
+    let mut progress = FineTuneProgress {
+        steps: config.steps,
+        held_out_residual_m: tuner.held_out_residual_m(),
+        ..FineTuneProgress::default()
+    };
+    while progress.step < config.steps {
+        progress.loss = tuner.step()?;
+        progress.step += 1;
+        let is_last = progress.step == config.steps;
+        if is_last || progress.step.is_multiple_of(config.held_out_every.max(1)) {
+            progress.held_out_residual_m = tuner.held_out_residual_m();
+        }
+        progress.elapsed_secs = clock() - start_secs;
+        let left = f64::from(config.steps - progress.step) / f64::from(progress.step);
+        progress.left_secs = progress.elapsed_secs * left;
+        if on_progress(&progress).is_break() {
+            break;
+        }
+    }
+    Ok(tuner.into_network())
+}
+
+/// Fine-tuning, one step at a time. Runs in the current rayon pool.
+pub struct FineTuner {
+    network: HyperNetwork,
+    optimizer: HyperOptimizer,
+    gradients: FieldGradients,
+    config: FineTuneConfig,
+    metres_per_unit: f32,
+    poses: Vec<PoseInput>,
+    keyframes: Vec<KeyframePoints>,
+    rng: StdRng,
+    step: u32,
+    points: Vec<Vec<Vec3>>,
+    known: Vec<Vec<LossPoint>>,
+}
+
+impl FineTuner {
+    /// Checks the samples and takes the network as its start.
+    pub fn new(
+        network: HyperNetwork,
+        samples: &[CanonicalSamples],
+        metres_per_unit: f32,
+        config: &FineTuneConfig,
+    ) -> Result<Self, AvatarError> {
+        check(samples)?;
+        let mut rng = StdRng::seed_from_u64(config.seed);
+        let weights = || {
+            samples
+                .iter()
+                .flat_map(|s| &s.weights)
+                .filter(|weight| **weight > 0.0)
+        };
+        let mean_weight = weights().sum::<f32>() / weights().count().max(1) as f32;
+        let keyframes = samples
+            .iter()
+            .map(|s| KeyframePoints::new(s, mean_weight, config.held_out_share, &mut rng))
+            .collect();
+        let poses: Vec<_> = samples.iter().map(|s| s.pose).collect();
+        let inputs = network.output_inputs(&poses);
+        Ok(Self {
+            optimizer: HyperOptimizer::new(&network, &inputs, &config.rates),
+            gradients: FieldGradients::new(network.config().field),
+            network,
+            config: *config,
+            metres_per_unit,
+            points: vec![Vec::new(); poses.len()],
+            known: vec![Vec::new(); poses.len()],
+            poses,
+            keyframes,
+            rng,
+            step: 0,
+        })
+    }
+
+    /// One Adam step over all keyframes; the loss before it.
+    pub fn step(&mut self) -> Result<LossTerms, AvatarError> {
+        let drawn = self.points.iter_mut().zip(&mut self.known);
+        for (keyframe, (points, known)) in self.keyframes.iter().zip(drawn) {
+            keyframe.draw(&self.config.sampling, &mut self.rng, points, known);
+        }
+        let (cache, parameters) = self.network.forward(&self.poses);
+        let frames: Vec<_> = parameters
+            .iter()
+            .zip(self.points.iter().zip(&self.known))
+            .map(|(parameters, (points, known))| FieldFrame { parameters, points, known })
+            .collect();
+        let terms = self.gradients.compute(&frames, &self.config.loss);
+        if !terms.total().is_finite() {
+            return Err(AvatarError::LossNotFinite { step: self.step, terms });
+        }
+        let bars: Vec<_> = (0..frames.len())
+            .map(|frame| self.gradients.frame(frame))
+            .collect();
+        let gradient = self.network.backward(cache, &bars);
+        let share = self.config.rate_share(self.step);
+        self.optimizer.step(&mut self.network, &gradient, share);
+        self.step += 1;
+        Ok(terms)
+    }
+
+    /// Mean distance to the surface of points that no step has seen, weighted as the loss weighs them.
+    pub fn held_out_residual_m(&self) -> f32 {
+        let (_, parameters) = self.network.forward(&self.poses);
+        let (mut sum, mut weights) = (0.0_f64, 0.0_f64);
+        for (keyframe, parameters) in self.keyframes.iter().zip(parameters) {
+            let held_out = &keyframe.held_out[..keyframe.held_out.len().min(HELD_OUT_POINTS)];
+            let points: Vec<Vec3> = held_out.iter().map(|at| at.point).collect();
+            let mut values = vec![0.0; points.len()];
+            SirenField::new(self.network.config().field, parameters).values(&points, &mut values);
+            for (value, at) in values.iter().zip(held_out) {
+                sum += f64::from(value.abs() * at.weight);
+                weights += f64::from(at.weight);
+            }
+        }
+        if weights > 0.0 {
+            (sum / weights) as f32 * self.metres_per_unit
+        } else {
+            f32::NAN
+        }
+    }
+
+    pub fn network(&self) -> &HyperNetwork {
+        &self.network
+    }
+
+    pub fn into_network(self) -> HyperNetwork {
+        self.network
+    }
+}
+
+fn check(samples: &[CanonicalSamples]) -> Result<(), AvatarError> {
+    if samples.is_empty() {
+        return Err(AvatarError::NoKeyframes);
+    }
+    for (keyframe, samples) in samples.iter().enumerate() {
+        let points = samples.points_in_unit.len();
+        let (normals, weights) = (samples.normals.len(), samples.weights.len());
+        if points != normals || points != weights {
+            return Err(AvatarError::SampleCounts { keyframe, points, normals, weights });
+        }
+        if samples.weights.iter().all(|weight| *weight <= 0.0) {
+            return Err(AvatarError::EmptyKeyframe { keyframe, points });
+        }
+        let all = samples.points_in_unit.iter().chain(&samples.normals);
+        if !all.chain(&samples.free_in_unit).all(|p| p.is_finite())
+            || !samples.weights.iter().all(|w| w.is_finite())
+        {
+            return Err(AvatarError::KeyframeNotFinite { keyframe });
+        }
+    }
+    Ok(())
+}

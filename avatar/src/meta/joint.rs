@@ -1,0 +1,167 @@
+//! Stage 2: one hypernetwork for many people, each with a code of their own.
+//!
+//! A person's code is added to the coefficients of every head, so that the shared basis spans both how people
+//! differ and how their surfaces follow the pose. Fine-tuning finds a new person's code in the coefficients'
+//! bias, which starts at the mean of all codes.
+
+use glam::Vec3;
+use rand::{RngExt as _, rngs::StdRng, seq::SliceRandom as _};
+use rayon::prelude::*;
+
+use super::{
+    config::PriorConfig,
+    reptile::{person_number, rng_of},
+    task::{PersonSource, Prepared},
+};
+use crate::{
+    error::AvatarError,
+    hyper::{HyperNetwork, optimizer::HyperOptimizer},
+    nn::{AdamConfig, AdamStep, adam::Moments},
+    sdf::{
+        SirenField,
+        batch::{FieldFrame, FieldGradients},
+        loss::LossPoint,
+    },
+};
+
+/// Stage 2 in progress.
+pub(super) struct Joint {
+    pub(super) network: HyperNetwork,
+    pub(super) optimizer: HyperOptimizer,
+    /// One a person: the coefficients of all heads, one after the other.
+    pub(super) codes: Vec<Vec<f32>>,
+    pub(super) code_moments: Vec<Moments>,
+    /// Steps each code has taken.
+    pub(super) code_steps: Vec<u32>,
+    people: Vec<Prepared>,
+    gradients: FieldGradients,
+    points: Vec<Vec<Vec3>>,
+    known: Vec<Vec<LossPoint>>,
+}
+
+impl Joint {
+    pub(super) fn new(phi: Vec<f32>, config: &PriorConfig, source: &dyn PersonSource) -> Self {
+        let mut rng = rng_of(config.seed, u64::MAX);
+        let meta = SirenField::new(config.network.field, phi);
+        let network = HyperNetwork::init(config.network, &meta, &mut rng);
+        let people: Vec<_> = (0..config.joint.people as u64)
+            .into_par_iter()
+            .map(|index| {
+                Prepared::new(source.person(person_number(500_000 + index), config.joint.frames))
+            })
+            .collect();
+        let inputs = network.output_inputs(&people[0].poses);
+        let size = network.code_size();
+        Self {
+            optimizer: HyperOptimizer::new(&network, &inputs, &config.joint.rates),
+            codes: vec![vec![0.0; size]; people.len()],
+            code_moments: vec![Moments::zeros(size); people.len()],
+            code_steps: vec![0; people.len()],
+            gradients: FieldGradients::new(config.network.field),
+            network,
+            people,
+            points: Vec::new(),
+            known: Vec::new(),
+        }
+    }
+
+    /// One step by its number; the loss before it.
+    pub(super) fn step(&mut self, number: u32, config: &PriorConfig) -> Result<f64, AvatarError> {
+        let mut rng = rng_of(config.seed ^ 0x5eed, u64::from(number));
+        let chosen = self.choose(config, &mut rng);
+        let poses: Vec<_> = chosen
+            .iter()
+            .map(|(p, f)| self.people[*p].poses[*f])
+            .collect();
+        self.points.resize_with(chosen.len(), Vec::new);
+        self.known.resize_with(chosen.len(), Vec::new);
+        let drawn = self.points.iter_mut().zip(&mut self.known);
+        for ((person, frame), (points, known)) in chosen.iter().zip(drawn) {
+            self.people[*person].points[*frame].draw(&config.sampling, &mut rng, points, known);
+        }
+        let codes: Vec<_> = chosen
+            .iter()
+            .map(|(person, _)| self.codes[*person].as_slice())
+            .collect();
+        let (cache, parameters) = self.network.forward_with_codes(&poses, &codes);
+        let frames: Vec<_> = parameters
+            .iter()
+            .zip(self.points.iter().zip(&self.known))
+            .map(|(parameters, (points, known))| FieldFrame { parameters, points, known })
+            .collect();
+        let terms = self.gradients.compute(&frames, &config.loss);
+        if !terms.total().is_finite() {
+            return Err(AvatarError::LossNotFinite { step: number, terms });
+        }
+        let bars: Vec<_> = (0..frames.len())
+            .map(|frame| self.gradients.frame(frame))
+            .collect();
+        let gradient = self.network.backward(cache, &bars);
+        let share = rate_share(number, config);
+        let code_bars = gradient.code_bars();
+        self.optimizer.step(&mut self.network, &gradient, share);
+        self.step_codes(&chosen, &code_bars, config, share);
+        Ok(terms.total())
+    }
+
+    /// The network with the mean code in its coefficients' biases.
+    pub(super) fn finish(mut self) -> HyperNetwork {
+        let mut mean = vec![0.0; self.network.code_size()];
+        for code in &self.codes {
+            mean.iter_mut()
+                .zip(code)
+                .for_each(|(sum, x)| *sum += x / self.codes.len() as f32);
+        }
+        self.network.add_code(&mean);
+        self.network
+    }
+
+    /// Persons and frames of one step.
+    fn choose(&self, config: &PriorConfig, rng: &mut StdRng) -> Vec<(usize, usize)> {
+        let mut people: Vec<usize> = (0..self.people.len()).collect();
+        let (chosen, _) = people.partial_shuffle(rng, config.joint.people_per_step);
+        let mut list = Vec::new();
+        for &mut person in chosen {
+            let frames = self.people[person].poses.len();
+            for _ in 0..config.joint.frames_per_person {
+                list.push((person, rng.random_range(0..frames)));
+            }
+        }
+        list
+    }
+
+    fn step_codes(
+        &mut self,
+        chosen: &[(usize, usize)],
+        bars: &[Vec<f32>],
+        config: &PriorConfig,
+        share: f32,
+    ) {
+        let joint = &config.joint;
+        let rows = chosen
+            .chunks(joint.frames_per_person)
+            .zip(bars.chunks(joint.frames_per_person));
+        for (frames, bars) in rows {
+            let person = frames[0].0;
+            let code = &mut self.codes[person];
+            let penalty = 2.0 * joint.code_penalty / code.len() as f32;
+            let mut gradient: Vec<f32> = code.iter().map(|x| penalty * x).collect();
+            for bar in bars {
+                gradient
+                    .iter_mut()
+                    .zip(bar)
+                    .for_each(|(sum, bar)| *sum += bar);
+            }
+            self.code_steps[person] += 1;
+            let step = AdamStep::new(AdamConfig::default(), self.code_steps[person]);
+            self.code_moments[person].step(&step, joint.code_rate * share, &gradient, code);
+        }
+    }
+}
+
+fn rate_share(number: u32, config: &PriorConfig) -> f32 {
+    let joint = &config.joint;
+    let warm = (number + 1) as f32 / 50.0;
+    let left = joint.steps.saturating_sub(number) as f32 / joint.steps.max(1) as f32;
+    warm.min(1.0) * (left / joint.decay_share.max(1e-6)).min(1.0)
+}

@@ -1,0 +1,13 @@
+//! The few pieces of neural network that the field, the hypernetwork and their training share.
+//!
+//! Matrices are row-major `f32` slices; a batch has one row an element. Nothing here starts a thread.
+
+pub(crate) mod adam;
+pub(crate) mod layer_norm;
+pub(crate) mod linear;
+pub(crate) mod matmul;
+pub(crate) mod simd;
+pub mod threads;
+
+pub use adam::{AdamConfig, AdamStep};
+pub use threads::{Threads, ThreadsConfig};
