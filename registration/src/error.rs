@@ -9,4 +9,19 @@ pub enum RegistrationError {
     /// A motion file that does not say what its format asks for; line 0 is the file as a whole.
     #[error("{path}, line {line}: expected {expected}, found {found}")]
     MotionFile { path: PathBuf, line: usize, expected: String, found: String },
+    /// A body file that is no zip archive of NumPy arrays, or a damaged one.
+    #[error(
+        "{path}: not a readable .npz body file: {problem}; official .pkl files must be converted first, \
+         with numpy.savez in the Python that loads them"
+    )]
+    BodyArchive { path: PathBuf, problem: String },
+    #[error(
+        "{path}: expected an array {array:?}, found only {found:?}; a body file needs all of SMPL's arrays"
+    )]
+    BodyArrayMissing { path: PathBuf, array: &'static str, found: Vec<String> },
+    #[error(
+        "{path}, array {array:?}: expected {expected}, found {found}; is this an SMPL body (24 joints), not \
+         SMPL-H or SMPL-X?"
+    )]
+    BodyArray { path: PathBuf, array: &'static str, expected: String, found: String },
 }
