@@ -9,7 +9,7 @@ pub enum RegistrationError {
     /// A motion file that does not say what its format asks for; line 0 is the file as a whole.
     #[error("{path}, line {line}: expected {expected}, found {found}")]
     MotionFile { path: PathBuf, line: usize, expected: String, found: String },
-    /// A body file that is no zip archive of NumPy arrays, or a damaged one.
+    /// A body file that is no zip archive of `NumPy` arrays, or a damaged one.
     #[error(
         "{path}: not a readable .npz body file: {problem}; official .pkl files must be converted first, \
          with numpy.savez in the Python that loads them"

@@ -136,3 +136,18 @@ fn identity_is_the_one_that_trained_files_carry() {
         "3f175226fedd8d2effdfdc582b23d866"
     );
 }
+
+#[test]
+fn one_unit_of_size_is_seven_centimetres_of_stature() {
+    let body = builtin::body();
+    let stature_m = |betas: &[f32; 10]| {
+        let shaped = body.shaped_vertices(betas);
+        let top = shaped.iter().map(|v| v.y).fold(f32::MIN, f32::max);
+        top - shaped.iter().map(|v| v.y).fold(f32::MAX, f32::min)
+    };
+    let mut larger = [0.0; 10];
+    larger[0] = 1.0;
+    let grown_m = stature_m(&larger) - stature_m(&[0.0; 10]);
+    // ANSUR II, men: 69 mm; a unit is rounded to whole per cents of each segment.
+    assert!((0.066..0.072).contains(&grown_m), "{grown_m} m");
+}

@@ -168,9 +168,9 @@ fn absurd_headers_do_not_take_memory() {
 }
 
 fn message(arrays: &Arrays) -> String {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = tempfile::tempdir().expect("a temporary file");
     BodyModel::load(&arrays.write(folder.path()))
-        .unwrap_err()
+        .expect_err("refused")
         .to_string()
 }
 
@@ -212,7 +212,10 @@ fn miniature() -> Arrays {
 
 impl Arrays {
     fn get(&mut self, array: &str) -> &mut (&'static str, Vec<u64>, Vec<f64>) {
-        self.0.iter_mut().find(|entry| entry.0 == array).unwrap()
+        self.0
+            .iter_mut()
+            .find(|entry| entry.0 == array)
+            .expect("a temporary file")
     }
 
     fn without(&self, array: &str) -> Self {
@@ -231,11 +234,11 @@ impl Arrays {
 
     fn write_as(&self, folder: &Path, order: npyz::Order) -> PathBuf {
         let path = folder.join("body.npz");
-        let mut archive = ZipWriter::new(File::create(&path).unwrap());
+        let mut archive = ZipWriter::new(File::create(&path).expect("a temporary file"));
         for (name, shape, data) in &self.0 {
             archive
                 .start_file(format!("{name}.npy"), SimpleFileOptions::default())
-                .unwrap();
+                .expect("a temporary file");
             let mut bytes = Vec::new();
             let mut writer = npyz::WriteOptions::new()
                 .default_dtype()
@@ -243,12 +246,14 @@ impl Arrays {
                 .order(order)
                 .writer(&mut bytes)
                 .begin_nd()
-                .unwrap();
-            writer.extend(in_order(data, shape, order)).unwrap();
-            writer.finish().unwrap();
-            archive.write_all(&bytes).unwrap();
+                .expect("a temporary file");
+            writer
+                .extend(in_order(data, shape, order))
+                .expect("a temporary file");
+            writer.finish().expect("a temporary file");
+            archive.write_all(&bytes).expect("a temporary file");
         }
-        archive.finish().unwrap();
+        archive.finish().expect("a temporary file");
         path
     }
 }

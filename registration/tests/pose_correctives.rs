@@ -1,4 +1,5 @@
 //! Bent limbs keep their thickness.
+#![expect(clippy::print_stdout, reason = "says what it measured")]
 
 use effigy_registration::smpl::{BodyModel, BodyParams, PoseDirection, builtin};
 use glam::{Mat3, Quat, Vec3};

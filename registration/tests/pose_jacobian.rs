@@ -41,8 +41,8 @@ fn joint_rows_match_finite_differences() {
     let mut rows = [Vec3::ZERO; PARAMETER_COUNT];
     for joint in 0..24 {
         jacobian.joint_rows(joint, &mut rows);
-        for (column, row) in rows.iter().enumerate() {
-            let expected = differences[column][joint];
+        for (column, (row, difference)) in rows.iter().zip(&differences).enumerate() {
+            let expected = difference[joint];
             assert!(
                 row.distance(expected) < TOLERANCE_M,
                 "joint {joint}, column {column}"

@@ -2,7 +2,7 @@
 
 use bytemuck::cast_slice;
 use glam::Vec3;
-use sha2::{Digest, Sha256};
+use sha2::{Digest as _, Sha256};
 
 use super::{BodyIdentity, BodyModel};
 

@@ -117,9 +117,7 @@ impl PoseJacobian {
 
     /// Metres of the posed joint a unit of each parameter.
     pub fn joint_rows(&self, joint: usize, rows: &mut [Vec3; PARAMETER_COUNT]) {
-        for beta in 0..10 {
-            rows[FIRST_BETA + beta] = self.posed_joint_dirs[joint][beta];
-        }
+        rows[FIRST_BETA..FIRST_TRANS].copy_from_slice(&self.posed_joint_dirs[joint]);
         let mut hanging = [(0.0, Vec3::ZERO); JOINT_COUNT];
         if joint != 0 {
             let position = self.poser.posed().joints[joint];

@@ -52,14 +52,13 @@ impl BodyModel {
 
     /// As [`Self::add_pose_correctives`], from rotation matrices relative to the parents.
     pub fn add_rotation_correctives(&self, vertices: &mut [Vec3], rotations: &[Mat3; JOINT_COUNT]) {
-        for joint in 1..JOINT_COUNT {
-            let rotation = rotations[joint] - Mat3::IDENTITY;
-            for entry in 0..9 {
+        for (rotation, directions) in rotations[1..].iter().zip(self.pose_dirs.chunks_exact(9)) {
+            let rotation = *rotation - Mat3::IDENTITY;
+            for (entry, direction) in directions.iter().enumerate() {
                 let value = rotation.row(entry / 3)[entry % 3];
                 if value == 0.0 {
                     continue;
                 }
-                let direction = &self.pose_dirs[(joint - 1) * 9 + entry];
                 for (&vertex, &offset) in direction.vertices.iter().zip(&direction.offsets) {
                     vertices[vertex as usize] += offset * value;
                 }
@@ -102,7 +101,7 @@ impl BoneTransforms {
         let joints = global.map(|g| Vec3::from(g.translation));
         let mut bones = global;
         for (bone, rest_joint) in bones.iter_mut().zip(rest_joints) {
-            *bone = *bone * Affine3A::from_translation(-*rest_joint);
+            *bone *= Affine3A::from_translation(-*rest_joint);
         }
         (Self(bones), joints)
     }

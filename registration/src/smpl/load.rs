@@ -62,10 +62,10 @@ fn template(file: &mut Npz) -> Result<Vec<Vec3>, RegistrationError> {
 fn check_tree(file: &mut Npz) -> Result<(), RegistrationError> {
     const NAME: &str = "kintree_table";
     let array = file.shaped(NAME, &[Some(2), Some(JOINT_COUNT)])?;
-    for joint in 1..JOINT_COUNT {
+    for (joint, &expected_parent) in PARENTS.iter().enumerate().skip(1) {
         let (parent, child) = (array.data[joint], array.data[JOINT_COUNT + joint]);
-        if parent != PARENTS[joint] as f64 || child != joint as f64 {
-            let expected = format!("joint {joint} with parent {}", PARENTS[joint]);
+        if parent != expected_parent as f64 || child != joint as f64 {
+            let expected = format!("joint {joint} with parent {expected_parent}");
             return Err(file.wrong(
                 NAME,
                 &expected,
@@ -135,7 +135,7 @@ fn joint_regressor(file: &mut Npz, count: usize) -> Result<Vec<SparseRow>, Regis
     Ok(rows)
 }
 
-/// SciPy's compressed sparse columns of a [24, V] matrix.
+/// The compressed sparse columns of a [24, V] matrix, as `scipy.sparse` names them.
 fn sparse_columns(file: &mut Npz, count: usize) -> Result<Vec<SparseRow>, RegistrationError> {
     const INDICES: &str = "J_regressor_indices";
     const STARTS: &str = "J_regressor_indptr";

@@ -13,7 +13,7 @@ use crate::RegistrationError;
 
 /// The largest array that is read: pose directions of 20,000 vertices in doubles take 100 MB.
 const LARGEST_ARRAY_BYTES: u64 = 128 << 20;
-/// NumPy's headers are about a hundred bytes.
+/// Array headers are about a hundred bytes.
 const LARGEST_HEADER_BYTES: usize = 64 << 10;
 
 /// An open archive.

@@ -22,7 +22,7 @@ pub(crate) struct SurfaceDistance {
 }
 
 impl SurfaceDistance {
-    pub(crate) fn symmetric_mm(&self) -> f32 {
+    pub(crate) fn symmetric_mm(self) -> f32 {
         0.5 * (self.body_to_target_mm + self.target_to_body_mm)
     }
 }
@@ -32,11 +32,11 @@ pub(crate) struct Fitted {
     pub(crate) posed: Vec<Vec3>,
 }
 
-pub(crate) fn fit(body: &Arc<BodyModel>, target: &TriangleMesh, start: BodyParams) -> Fitted {
+pub(crate) fn fit(body: &Arc<BodyModel>, target: &TriangleMesh, start: &BodyParams) -> Fitted {
     let target_surface = ClosestPoint::from_mesh(target).expect("a sound mesh");
     let samples = sample_surface(target, TARGET_SAMPLES, 7);
     let mut jacobian = PoseJacobian::new(Arc::clone(body));
-    let mut params = start;
+    let mut params = *start;
     let mut body_surface = ClosestPoint::new(&body.template, &body.triangles).expect("a body");
     for round in 0..ROUNDS {
         let progress = round as f32 / ROUNDS as f32;
@@ -73,7 +73,7 @@ pub(crate) fn fit(body: &Arc<BodyModel>, target: &TriangleMesh, start: BodyParam
             let residual = sample.normal.dot(hit.point - sample.point);
             equations.add(&sum, sample.normal, residual, robust(hit.distance, width_m));
         }
-        step(&mut params, &start, equations);
+        step(&mut params, start, equations);
     }
     let posed = jacobian.update(&params).vertices.clone();
     Fitted { params, posed }
@@ -136,8 +136,8 @@ impl Equations {
         for i in (0..PARAMETER_COUNT).filter(|&i| row[i] != 0.0) {
             let scaled = weight * row[i];
             self.gradient[i] += scaled * f64::from(residual);
-            for j in 0..=i {
-                self.normal[i][j] += scaled * row[j];
+            for (sum, other) in self.normal[i][..=i].iter_mut().zip(row) {
+                *sum += scaled * other;
             }
         }
     }
@@ -182,10 +182,8 @@ fn solve(
 ) -> [f64; PARAMETER_COUNT] {
     for j in 0..PARAMETER_COUNT {
         for i in j..PARAMETER_COUNT {
-            let mut sum = a[i][j];
-            for k in 0..j {
-                sum -= a[i][k] * a[j][k];
-            }
+            let along: f64 = a[i][..j].iter().zip(&a[j][..j]).map(|(p, q)| p * q).sum();
+            let sum = a[i][j] - along;
             a[i][j] = if i == j {
                 sum.max(1e-12).sqrt()
             } else {
