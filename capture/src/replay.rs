@@ -8,7 +8,7 @@ use crate::time::Timestamp;
 const MAX_GAP_SECS: f64 = 5.0;
 
 /// What to do with the next frame.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Due {
     /// It is early: wait this long, then deliver it.
     Wait(Duration),
@@ -47,7 +47,7 @@ impl Pacer {
     pub fn due(&mut self, frame: Timestamp, now: Duration) -> Due {
         let jumped = |anchor: &Anchor| {
             let step = frame - anchor.last;
-            step < 0.0 || step > MAX_GAP_SECS
+            !(0.0..=MAX_GAP_SECS).contains(&step)
         };
         let mut anchor = match self.anchor {
             Some(anchor) if !jumped(&anchor) => anchor,

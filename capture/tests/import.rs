@@ -10,6 +10,7 @@ use std::{
 };
 
 use effigy_capture::{CaptureError, FrameSource, Timestamp, source};
+use proptest::prelude::*;
 
 /// A 16-bit PNG of one value.
 fn write_depth(path: &Path, [width, height]: [u32; 2], value: u16) {
@@ -185,6 +186,7 @@ fn an_image_of_another_size_in_the_middle_is_an_error_that_names_it() {
     );
 }
 
+#[expect(clippy::print_stdout, reason = "a skipped test says why")]
 /// Real recordings beside the project; without them the tests below have nothing to say.
 fn real(name: &str) -> Option<PathBuf> {
     let beside = PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/data"));
@@ -240,5 +242,37 @@ fn real_folders_and_images_open() {
         assert_eq!(play(source.as_mut()).len(), frames, "{name}");
         let camera = source.calibration().depth.intrinsics;
         approx::assert_abs_diff_eq!(camera.fx, focal_px, epsilon = 0.01);
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 300, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn files_of_random_bytes_are_refused_without_a_panic(
+        magic in prop::sample::select(vec![&b"P5 3 2 65535\n"[..], b"\x89PNG\r\n\x1a\n", b"# .PCD v0.7\n", b"VERSION 0.7\n", b""]),
+        bytes in prop::collection::vec(any::<u8>(), 0..200),
+    ) {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("random");
+        fs::write(&path, [magic, &bytes].concat()).unwrap();
+        // A PGM of 12 random bytes is a fine image; all else is refused.
+        prop_assert!(source::open(&path).is_err() || magic.starts_with(b"P5") && bytes.len() >= 12);
+    }
+
+    #[test]
+    fn clouds_with_strange_headers_are_refused_or_read_without_a_panic(
+        width in 0..40u32, height in 0..40u32, size in 0..9usize, count in 0..2000usize,
+        kind in prop::sample::select(vec!["F", "I", "U", "X"]),
+        data in prop::sample::select(vec!["ascii", "binary", "binary_compressed", "other"]),
+        bytes in prop::collection::vec(any::<u8>(), 0..400),
+    ) {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("strange.pcd");
+        let header = format!(
+            "VERSION 0.7\nFIELDS x y z rgb\nSIZE {size} 4 4 4\nTYPE {kind} F F U\nCOUNT 1 1 {count} 1\nWIDTH {width}\nHEIGHT {height}\nDATA {data}\n"
+        );
+        fs::write(&path, [header.as_bytes(), &bytes].concat()).unwrap();
+        let _opened = source::open(&path);
     }
 }

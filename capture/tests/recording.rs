@@ -335,7 +335,10 @@ fn a_cut_says_how_much_is_missing() {
     fs::write(&path, &bytes[..last - 100]).unwrap();
     let damage = Recording::open(&path).unwrap().damage().unwrap().clone();
     assert_eq!(damage.missing_bytes, 100);
-    assert_eq!(damage.reason, "the file ends inside a chunk of frames");
+    assert_eq!(
+        damage.reason,
+        "the file ends inside a chunk with 0.25 s of frames"
+    );
     let text = damage.to_string();
     assert!(
         text.contains("at least 100 are missing") && text.contains("never finished"),
@@ -409,19 +412,21 @@ proptest! {
     fn random_bytes_are_refused_or_empty(bytes in prop::collection::vec(any::<u8>(), 0..300), magic in any::<bool>()) {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("random.mcap");
-        let magic: &[u8] = if magic { &mcap::MAGIC[..] } else { &[] };
+        let magic: &[u8] = if magic { mcap::MAGIC } else { &[] };
         fs::write(&path, [magic, &bytes].concat()).unwrap();
         prop_assert!(Recording::open(&path).is_err());
     }
 }
 
-static SAMPLE: std::sync::LazyLock<(Vec<u8>, Vec<(usize, usize)>)> =
-    std::sync::LazyLock::new(|| {
-        let dir = tempfile::tempdir().unwrap();
-        let bytes = fs::read(written(&dir, 30)).unwrap();
-        let ends = chunk_ends(&bytes);
-        (bytes, ends)
-    });
+/// A recording's bytes, with its chunks' ends and frames.
+type Sample = (Vec<u8>, Vec<(usize, usize)>);
+
+static SAMPLE: std::sync::LazyLock<Sample> = std::sync::LazyLock::new(|| {
+    let dir = tempfile::tempdir().unwrap();
+    let bytes = fs::read(written(&dir, 30)).unwrap();
+    let ends = chunk_ends(&bytes);
+    (bytes, ends)
+});
 
 #[test]
 fn a_recording_without_its_index_plays_all_frames() {

@@ -100,8 +100,8 @@ fn last_number(stem: &str) -> Option<u64> {
 fn numbered(number: u64, place: u64) -> (Timestamp, u64) {
     match number {
         1_000_000_000_000_000_000.. => (Timestamp(number), place),
-        1_000_000_000_000_000.. => (Timestamp(number * 1_000), place),
-        1_000_000_000_000.. => (Timestamp(number * 1_000_000), place),
+        1_000_000_000_000_000..10_000_000_000_000_000 => (Timestamp(number * 1_000), place),
+        1_000_000_000_000..10_000_000_000_000 => (Timestamp(number * 1_000_000), place),
         _ => (
             Timestamp::from_secs_f64(number as f64 / NUMBERED_RATE_HZ),
             number,

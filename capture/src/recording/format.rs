@@ -43,8 +43,8 @@ pub(crate) const MAX_METADATA_BYTES: u64 = 16 * 1024 * 1024;
 pub(crate) const MAX_SUMMARY_BYTES: u64 = 64 * 1024 * 1024;
 /// A frame's id and an event's JSON.
 pub(crate) const MAX_JSON_BYTES: u64 = 1024 * 1024;
-/// Avatar swaps and the like: a few a minute.
-pub(crate) const MAX_EVENTS: usize = 100_000;
+/// All events together: avatar swaps and the like, a few a minute.
+pub(crate) const MAX_EVENT_BYTES: usize = 64 * 1024 * 1024;
 /// A day at 60 Hz is half of this; each costs about 100 bytes of index.
 pub(crate) const MAX_FRAMES: usize = 10_000_000;
 

@@ -131,11 +131,10 @@ fn from_walk(file: &mut BufReader<File>, file_bytes: u64) -> io::Result<Outline>
         let end = at + RECORD_HEADER + record.body_bytes;
         if end > file_bytes {
             outline.damage.missing_bytes = end - file_bytes;
-            outline.damage.note(
-                at,
-                rest,
-                format!("the file ends inside {}", kind(record.opcode)),
-            );
+            let what = kind(file, record.opcode, rest - RECORD_HEADER)?;
+            outline
+                .damage
+                .note(at, rest, format!("the file ends inside {what}"));
             return Ok(outline);
         }
         match record.opcode {
@@ -151,12 +150,20 @@ fn from_walk(file: &mut BufReader<File>, file_bytes: u64) -> io::Result<Outline>
     }
 }
 
-fn kind(opcode: u8) -> &'static str {
-    match opcode {
-        opcode::CHUNK => "a chunk of frames",
-        opcode::METADATA => "its metadata",
-        _ => "a record between chunks",
-    }
+/// What the record is whose body the file stands at, of which so many bytes are there.
+fn kind(file: &mut BufReader<File>, opcode: u8, available: u64) -> io::Result<String> {
+    Ok(match opcode {
+        opcode::CHUNK if available >= 16 => {
+            let mut times = [0; 16];
+            file.read_exact(&mut times)?;
+            let (first, last) = records::chunk_times(&times).unwrap_or_default();
+            let secs = last.saturating_sub(first) as f64 * 1e-9;
+            format!("a chunk with {secs:.2} s of frames")
+        }
+        opcode::CHUNK => "a chunk of frames".to_owned(),
+        opcode::METADATA => "its metadata".to_owned(),
+        _ => "a record between chunks".to_owned(),
+    })
 }
 
 /// Reads the metadata record's body at a place.

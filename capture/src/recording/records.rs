@@ -141,6 +141,12 @@ pub(super) fn metadata_index(body: &[u8]) -> Option<(u64, u64, &str)> {
     Some((fields.u64()?, fields.u64()?, fields.string()?))
 }
 
+/// Log times of a chunk's first and last message, from the start of its body.
+pub(super) fn chunk_times(body: &[u8]) -> Option<(u64, u64)> {
+    let mut fields = Fields(body);
+    Some((fields.u64()?, fields.u64()?))
+}
+
 /// A chunk index: where the chunk record lies and how long it is.
 pub(super) fn chunk_index(body: &[u8]) -> Option<(u64, u64)> {
     let mut fields = Fields(body);

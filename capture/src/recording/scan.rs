@@ -8,7 +8,9 @@ use std::{
 
 use super::{
     chunk::{self, ChunkPlace, Found, MessagePlace, Trouble, broken},
-    format::{EventMessage, FrameMessage, MAX_EVENTS, MAX_FRAMES, MAX_JSON_BYTES, opcode, topic},
+    format::{
+        EventMessage, FrameMessage, MAX_EVENT_BYTES, MAX_FRAMES, MAX_JSON_BYTES, opcode, topic,
+    },
     outline::Outline,
     reader::Event,
     records::{self, MESSAGE_HEADER, MessageHeader, RECORD_HEADER},
@@ -55,18 +57,20 @@ struct Index {
     color: HashMap<Key, MessagePlace>,
     frames: Vec<(FrameId, Key)>,
     events: Vec<Event>,
+    event_bytes: usize,
 }
 
 impl Index {
     fn append(&mut self, more: Self, outline: &mut Outline) {
-        if self.frames.len() + more.frames.len() > MAX_FRAMES
-            || self.events.len() + more.events.len() > MAX_EVENTS
-        {
+        let frames = self.frames.len() + more.frames.len();
+        let event_bytes = self.event_bytes + more.event_bytes;
+        if frames > MAX_FRAMES || event_bytes > MAX_EVENT_BYTES {
             let reason = format!(
-                "more than {MAX_FRAMES} frames or {MAX_EVENTS} events: the rest is left out"
+                "{frames} frames and {event_bytes} bytes of events are more than is read: the rest is left out"
             );
             return outline.damage.note(0, 0, reason);
         }
+        self.event_bytes = event_bytes;
         self.depth.extend(more.depth);
         self.color.extend(more.color);
         self.frames.extend(more.frames);
@@ -87,6 +91,13 @@ impl Index {
                         .note(0, 0, format!("frame {} has lost its depth image", id.0));
                 }
             }
+        }
+        // A frame message that was changed leaves an image behind.
+        let orphans = self.depth.len().saturating_sub(entries.len());
+        if orphans > 0 {
+            outline
+                .damage
+                .note(0, 0, format!("{orphans} depth images belong to no frame"));
         }
         entries
     }
@@ -111,7 +122,9 @@ impl Index {
                 self.frames.push((FrameId(id), key));
             }
             topic::EVENT => {
-                let EventMessage { name, value } = parse(&json()?)?;
+                let json = json()?;
+                let EventMessage { name, value } = parse(&json)?;
+                self.event_bytes += json.len();
                 self.events
                     .push(Event { name, timestamp: Timestamp(header.log_time), value });
             }

@@ -158,10 +158,14 @@ mod tests {
 
     #[test]
     fn ascii_binary_and_compressed_clouds_give_the_same_depth_and_camera() {
-        let ascii: String = points()
+        let lines: Vec<String> = points()
             .iter()
-            .map(|([x, y, z], rgb)| format!("{x} {y} {z} {rgb}\n"))
+            .map(|([x, y, z], rgb)| format!("{x} {y} {z} {rgb}"))
             .collect();
+        let ascii = lines.join(
+            "
+",
+        );
         assert_is_the_wall(format!("{HEADER}DATA ascii\n{ascii}").as_bytes());
         let words =
             |([x, y, z], rgb): ([f32; 3], u32)| [x.to_bits(), y.to_bits(), z.to_bits(), rgb];
