@@ -2,14 +2,14 @@
 
 use super::{
     Clay, MeshView, Picture, PictureCamera, color_of_share, draw_text, palette, render_mesh,
-    text_width_px,
 };
 
 /// The part of the colour map in use, from no distance to the largest: blue, purple, red, yellow. The
 /// darkest blues are left out: they would sink into the background.
 const AT_ZERO: f32 = 0.86;
 const AT_LARGEST: f32 = 0.0;
-const LEGEND_PX: [u32; 2] = [110, 7];
+const LEGEND_PX: [u32; 2] = [7, 64];
+const LEGEND_AT_PX: [u32; 2] = [12, 12];
 const LEGEND_CAP_PX: f32 = 9.0;
 
 /// What the brightest colour stands for.
@@ -46,33 +46,32 @@ pub fn heat_picture(
     picture
 }
 
-/// A bar of the scale's colours between "0" and its largest distance in millimetres.
+/// A standing bar of the scale's colours between "0" and its largest distance in millimetres.
 pub fn draw_legend(picture: &mut Picture, scale: HeatScale) {
-    let label = format!("{:.0} mm", scale.largest_m * 1000.0);
-    let zero_px = text_width_px("0", LEGEND_CAP_PX);
-    let left = 10 + zero_px as u32 + 6;
-    let top = 10;
-    for y in top..(top + LEGEND_PX[1]).min(picture.height()) {
-        for x in left..(left + LEGEND_PX[0]).min(picture.width()) {
-            let share = (x - left) as f32 / (LEGEND_PX[0] - 1) as f32;
+    let [left, top] = LEGEND_AT_PX;
+    let [width, height] = LEGEND_PX;
+    for y in top..(top + height).min(picture.height()) {
+        for x in left..(left + width).min(picture.width()) {
+            let share = 1.0 - (y - top) as f32 / (height - 1) as f32;
             picture.get_pixel_mut(x, y).0 = scale.color(share * scale.largest_m);
         }
     }
-    let text_top = top as f32 + 0.5 * (LEGEND_PX[1] as f32 - LEGEND_CAP_PX);
+    let label = format!("{:.0} mm", scale.largest_m * 1000.0);
+    let beside = (left + width + 6) as f32;
+    let bottom = (top + height) as f32 - LEGEND_CAP_PX;
     draw_text(
         picture,
-        [10.0, text_top],
-        LEGEND_CAP_PX,
-        palette::TEXT_DIM,
-        "0",
-    );
-    let right = (left + LEGEND_PX[0] + 6) as f32;
-    draw_text(
-        picture,
-        [right, text_top],
+        [beside, top as f32],
         LEGEND_CAP_PX,
         palette::TEXT_DIM,
         &label,
+    );
+    draw_text(
+        picture,
+        [beside, bottom],
+        LEGEND_CAP_PX,
+        palette::TEXT_DIM,
+        "0",
     );
 }
 

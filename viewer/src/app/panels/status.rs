@@ -86,6 +86,7 @@ fn figures(ui: &mut Ui, snapshot: &Snapshot, desk: &Desk) {
         let hover = "Latency from exposure to avatar: median / 95th percentile";
         ui.label(RichText::new(text).monospace())
             .on_hover_text(hover);
+        ui.add_space(8.0);
     }
     if performance.frames_per_sec > 0.0 {
         let text = format!("{:.1} fps", performance.frames_per_sec);
