@@ -158,7 +158,7 @@ impl SensorModel {
             Self::TimeOfFlight { floor_m, slope } => {
                 floor_m
                     + slope * (depth_m - 0.5).max(0.0)
-                    + 0.0001 * depth_m.max(0.0).powf(1.5) * grazing
+                    + 0.0001 * depth_m.max(0.0) * depth_m.max(0.0).sqrt() * grazing
             }
         }
     }

@@ -123,8 +123,7 @@ impl SensorPreset {
 
     fn mount(self) -> Mount {
         match self {
-            Self::Azure => Mount { height_m: 1.20, distance_m: 2.45, down_rad: 0.02 },
-            Self::D435 => Mount { height_m: 1.20, distance_m: 2.45, down_rad: 0.02 },
+            Self::Azure | Self::D435 => Mount { height_m: 1.20, distance_m: 2.45, down_rad: 0.02 },
             Self::Oak => Mount { height_m: 1.20, distance_m: 3.00, down_rad: 0.0 },
             Self::Kinect => Mount { height_m: 1.20, distance_m: 3.30, down_rad: 0.0 },
         }

@@ -49,6 +49,10 @@ impl Scene {
         Ok(Self { scenario, person, calibration, world_from_camera, motion })
     }
 
+    pub(crate) fn motion_secs(&self) -> f32 {
+        self.motion.duration_secs()
+    }
+
     pub(crate) fn timestamp(&self, frame: FrameId) -> Timestamp {
         Timestamp::from_secs_f64(frame.0 as f64 / f64::from(self.scenario.rate_hz()))
     }

@@ -15,6 +15,9 @@ use crate::{
     scene::Scene,
 };
 
+#[cfg(test)]
+mod tests;
+
 /// A depth camera with a moving person in front of it.
 pub struct SimulatedSensor {
     scene: Scene,
@@ -65,6 +68,11 @@ impl SimulatedSensor {
             depth: Arc::new(DepthImage::new(width, height, raw)?),
             color,
         })
+    }
+
+    /// How long the movement takes before it repeats.
+    pub fn motion_secs(&self) -> f32 {
+        self.scene.motion_secs()
     }
 
     pub fn scenario(&self) -> &Scenario {

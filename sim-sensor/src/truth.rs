@@ -44,7 +44,7 @@ impl Truth {
     /// Only the parameters: cheap.
     pub fn params(&self, frame: FrameId) -> BodyParams {
         let pose = self.scene.pose(frame);
-        self.scene.person.params(pose.theta, pose.trans)
+        self.scene.person.params(&pose.theta, pose.trans)
     }
 
     pub fn at(&self, frame: FrameId) -> GroundTruth {

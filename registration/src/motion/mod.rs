@@ -13,6 +13,9 @@ mod retarget;
 pub use library::Routine;
 pub use rest_body::RestBody;
 
+/// Movement of the whole body slower than this counts as travel.
+const WANDER_SECS: f32 = 0.6;
+
 /// A sequence of poses at a fixed rate. `trans` is metres in the world (y up).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Motion {
@@ -70,15 +73,24 @@ impl Motion {
         self
     }
 
-    /// Takes the steady travel out, as on a treadmill: what is left stays around one spot.
+    /// Takes travel out, as on a treadmill: what is left stays around the spot of the first pose.
     pub fn in_place(mut self) -> Self {
         let (Some(first), Some(last)) = (self.poses.first(), self.poses.last()) else {
             return self;
         };
-        let travel = (last.trans - first.trans) * Vec3::new(1.0, 0.0, 1.0);
+        let start = first.trans;
+        let travel = last.trans - start;
         let steps = (self.poses.len() - 1).max(1) as f32;
+        // Steady travel first, so that the ends of the mean below are not biased.
+        let aside: Vec<Vec3> = (self.poses.iter().enumerate())
+            .map(|(i, pose)| pose.trans - start - travel * (i as f32 / steps))
+            .collect();
+        let reach = ((self.rate_hz * WANDER_SECS) as usize).max(1);
         for (i, pose) in self.poses.iter_mut().enumerate() {
-            pose.trans -= travel * (i as f32 / steps);
+            let window = &aside[i.saturating_sub(reach)..(i + reach + 1).min(aside.len())];
+            let wandered = window.iter().sum::<Vec3>() / window.len() as f32;
+            let moved = start + aside[i] - wandered;
+            pose.trans = Vec3::new(moved.x, pose.trans.y, moved.z);
         }
         self
     }

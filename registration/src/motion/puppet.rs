@@ -42,6 +42,10 @@ pub(super) struct Foot {
 }
 
 /// An arm, the same for both sides.
+#[expect(
+    clippy::struct_field_names,
+    reason = "a number's name ends in its unit"
+)]
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Arm {
     /// Sideways from hanging (0) over horizontal (pi/2) to overhead.
@@ -136,7 +140,7 @@ impl Foot {
 
 impl Arm {
     /// Collar, shoulder and elbow of a left arm, relative to their parents.
-    fn left_rotations(&self) -> (Quat, Quat, Quat) {
+    fn left_rotations(self) -> (Quat, Quat, Quat) {
         let abduction = self.abduction_rad.min(ABDUCTION_LIMIT_RAD);
         let hanging = vec3(abduction.sin(), -abduction.cos(), 0.0);
         let direction = Quat::from_rotation_x(-self.flexion_rad) * hanging;

@@ -19,11 +19,11 @@ impl RestBody {
     /// The minimal body of these betas.
     pub fn of(body: &BodyModel, betas: &[f32; 10]) -> Self {
         let shaped = body.shaped_vertices(betas);
-        Self::with_surface(body, body.joints(&shaped), &shaped)
+        Self::with_surface(body, &body.joints(&shaped), &shaped)
     }
 
     /// A body with a surface of its own (shoes, say) on the model's topology, in the zero pose.
-    pub fn with_surface(body: &BodyModel, joints: [Vec3; JOINT_COUNT], vertices: &[Vec3]) -> Self {
+    pub fn with_surface(body: &BodyModel, joints: &[Vec3; JOINT_COUNT], vertices: &[Vec3]) -> Self {
         let on_foot = |weights: &VertexWeights| {
             let share = |(bone, weight): (&u8, &f32)| {
                 if FOOT_JOINTS.contains(bone) {
@@ -47,7 +47,7 @@ impl RestBody {
             .partition(|(_, weights)| on_foot(weights));
         // Enough to notice a hand or a knee on the floor.
         let others = others.into_iter().step_by(16).collect();
-        Self { joints, soles, others }
+        Self { joints: *joints, soles, others }
     }
 
     /// The lowest point of the feet in the zero pose: the height of the floor there.

@@ -46,10 +46,11 @@ pub(super) fn onto_smpl(
     })?;
     let source = SourceRest::measure(clip, &map);
     let alignments = alignments(&source, &map, rest);
-    let scale = source.leg_length(rest);
+    let metres_per_unit = source.metres_per_unit(rest);
+    let retargeting = Retargeting { map, source, alignments, metres_per_unit };
     let start = usize::from(first_frame_is_calibration(clip));
     let mut poses: Vec<MotionPose> = (start..clip.frames.len())
-        .map(|frame| retarget_frame(clip, frame, &map, &source, &alignments, scale, rest))
+        .map(|frame| retargeting.pose(&clip.global_pose(frame), rest))
         .collect();
     put_on_floor(&mut poses, rest);
     let name = path
@@ -84,7 +85,7 @@ impl SourceRest {
     }
 
     /// Metres of the performing body a unit of the file.
-    fn leg_length(&self, rest: &RestBody) -> f32 {
+    fn metres_per_unit(&self, rest: &RestBody) -> f32 {
         let ours =
             rest.joints[1].distance(rest.joints[4]) + rest.joints[4].distance(rest.joints[7]);
         if self.leg_length > 0.0 {
@@ -144,34 +145,35 @@ fn alignments(source: &SourceRest, map: &JointMap, rest: &RestBody) -> [Quat; JO
     alignments
 }
 
-fn retarget_frame(
-    clip: &BvhClip,
-    frame: usize,
-    map: &JointMap,
-    source: &SourceRest,
-    alignments: &[Quat; JOINT_COUNT],
+/// Everything that stays the same from frame to frame.
+struct Retargeting {
+    map: JointMap,
+    source: SourceRest,
+    alignments: [Quat; JOINT_COUNT],
     metres_per_unit: f32,
-    rest: &RestBody,
-) -> MotionPose {
-    let globals = clip.global_pose(frame);
-    let convert = source.ours_from_file;
-    let mut ours = [Quat::IDENTITY; JOINT_COUNT];
-    let mut theta = [Vec3::ZERO; JOINT_COUNT];
-    for joint in 0..JOINT_COUNT {
-        let parent = if joint == 0 {
-            Quat::IDENTITY
-        } else {
-            ours[PARENTS[joint]]
-        };
-        ours[joint] = match map.0[joint] {
-            Some(theirs) => convert * globals[theirs].0 * convert.inverse() * alignments[joint],
-            None => parent,
-        };
-        theta[joint] = short_axis_angle((parent.inverse() * ours[joint]).normalize());
+}
+
+impl Retargeting {
+    /// One frame, from the global rotation and position of each source joint.
+    fn pose(&self, globals: &[(Quat, Vec3)], rest: &RestBody) -> MotionPose {
+        let convert = self.source.ours_from_file;
+        let mut ours = [Quat::IDENTITY; JOINT_COUNT];
+        let mut theta = [Vec3::ZERO; JOINT_COUNT];
+        for joint in 0..JOINT_COUNT {
+            let parent = if joint == 0 {
+                Quat::IDENTITY
+            } else {
+                ours[PARENTS[joint]]
+            };
+            ours[joint] = self.map.0[joint].map_or(parent, |theirs| {
+                convert * globals[theirs].0 * convert.inverse() * self.alignments[joint]
+            });
+            theta[joint] = short_axis_angle((parent.inverse() * ours[joint]).normalize());
+        }
+        let root = self.map.0[0].map_or(Vec3::ZERO, |root| globals[root].1);
+        let trans = convert * root * self.metres_per_unit - rest.joints[0];
+        MotionPose { theta, trans }
     }
-    let root = map.0[0].map_or(Vec3::ZERO, |root| globals[root].1);
-    let trans = convert * root * metres_per_unit - rest.joints[0];
-    MotionPose { theta, trans }
 }
 
 fn first_frame_is_calibration(clip: &BvhClip) -> bool {

@@ -94,6 +94,8 @@ impl Stereo {
         let noise_px = (self.subpixel_rms_px * self.subpixel_rms_px - rounding)
             .max(0.0)
             .sqrt();
+        // `texture` is normal: most windows have enough of it.
+        let least_texture = -normal_threshold(self.hole_share);
         for y in 0..view.height {
             let row = y * view.width..(y + 1) * view.width;
             let mut nearest_match = f32::MAX;
@@ -107,11 +109,11 @@ impl Stereo {
                 let matched = x as f32 - ideal;
                 let hidden = matched > nearest_match + 0.5;
                 nearest_match = nearest_match.min(matched);
-                if hidden || self.fails(view, pixel, buffers.texture[pixel]) {
+                if hidden || buffers.texture[pixel] < least_texture + self.weakness(view, pixel) {
                     continue;
                 }
                 let noisy =
-                    ideal + self.grazing_gain(view, pixel) * noise_px * buffers.noise[pixel];
+                    ideal + Self::grazing_gain(view, pixel) * noise_px * buffers.noise[pixel];
                 let stepped = (noisy * self.steps_per_px).round() / self.steps_per_px;
                 metres[pixel] = if stepped > 0.0 {
                     focal_baseline / stepped
@@ -123,18 +125,19 @@ impl Stereo {
     }
 
     /// As in [`SensorModel::sigma_m`]: the model and the simulation agree on slanted surfaces too.
-    fn grazing_gain(&self, view: &View, pixel: usize) -> f32 {
+    fn grazing_gain(view: &View, pixel: usize) -> f32 {
+        if view.cosine[pixel] > 0.95 {
+            return 1.0;
+        }
         let model = SensorModel::Stereo { baseline_m: 1.0, focal_px: 1.0, subpixel_rms_px: 1.0 };
-        model.sigma_m(1.0, view.cos_incidence(pixel).acos())
+        model.sigma_m(1.0, view.incidence_rad[pixel])
     }
 
-    fn fails(&self, view: &View, pixel: usize, texture: f32) -> bool {
-        let cosine = view.cos_incidence(pixel);
+    /// How much more texture a dark or slanted surface needs to be matched.
+    fn weakness(&self, view: &View, pixel: usize) -> f32 {
         let darkness = (1.0 - view.reflectance[pixel] / self.dark_reflectance).max(0.0);
-        let slant = (1.0 - cosine / self.least_cosine).max(0.0);
-        // `texture` is normal: most windows have enough of it.
-        let hole = normal_threshold(self.hole_share);
-        texture < -hole + 3.0 * darkness + 4.0 * slant
+        let slant = (1.0 - view.cosine[pixel] / self.least_cosine).max(0.0);
+        5.0 * (darkness + slant)
     }
 
     /// A window that straddles an edge takes the nearer surface's disparity: objects grow at their edges.
@@ -169,8 +172,8 @@ impl Stereo {
     }
 }
 
-/// Normal noise of deviation 1, alike over a window: white noise under a box of the window's width, twice
-/// half as wide, so that it fades instead of breaking off.
+/// Normal noise of deviation 1, alike over a window: white noise under two boxes, so that likeness fades
+/// instead of breaking off. Sums of 25 x 25 and more even numbers are as good as normal.
 fn correlated_noise(
     shot: Shot,
     purpose: u64,
@@ -180,61 +183,57 @@ fn correlated_noise(
     scratch: &mut Vec<f32>,
 ) {
     let random = shot.randomness(purpose);
+    let radius = (window_px / 3).max(1);
+    let n = (2 * radius + 1) as f32;
+    // What two boxes leave of white noise's variance, along each axis.
+    let kept: f32 = (1..2 * n as i32)
+        .map(|k| (n - (k as f32 - n).abs()) / (n * n))
+        .map(|weight| weight * weight)
+        .sum();
+    let gain = 12f32.sqrt() / kept;
     noise.clear();
-    noise.extend((0..width * height).map(|pixel| random.gaussian(pixel as u64)));
-    let radius = (window_px / 4).max(1);
+    noise.extend((0..width * height).map(|pixel| (random.uniform(pixel as u64) - 0.5) * gain));
     for _ in 0..2 {
         box_rows(noise, scratch, [width, height], radius);
         box_columns(scratch, noise, [width, height], radius);
     }
-    // The variance that two boxes leave of white noise, along each axis.
-    let n = (2 * radius + 1) as f32;
-    let kept: f32 = (0..2 * n as usize - 1)
-        .map(|k| {
-            let weight = (n - (k as f32 - (n - 1.0)).abs()) / (n * n);
-            weight * weight
-        })
-        .sum();
-    for value in noise.iter_mut() {
-        *value /= kept;
-    }
 }
 
-/// A moving mean along rows, repeating the border.
+/// A moving mean along rows. The border wraps around, which keeps the variance there.
 fn box_rows(from: &[f32], to: &mut Vec<f32>, [width, height]: [usize; 2], radius: usize) {
     to.resize(width * height, 0.0);
     let share = 1.0 / (2 * radius + 1) as f32;
+    let mut padded = vec![0.0; width + 2 * radius];
     for y in 0..height {
         let row = &from[y * width..(y + 1) * width];
-        let out = &mut to[y * width..(y + 1) * width];
-        for x in 0..width {
-            let mut sum = 0.0;
-            for k in 0..=2 * radius {
-                sum += row[wrapped(x + k, radius, width)];
-            }
-            out[x] = sum * share;
-        }
+        padded[..radius].copy_from_slice(&row[width - radius..]);
+        padded[radius..width + radius].copy_from_slice(row);
+        padded[width + radius..].copy_from_slice(&row[..radius]);
+        add_shifted(
+            &mut to[y * width..(y + 1) * width],
+            share,
+            (0..=2 * radius).map(|k| &padded[k..]),
+        );
     }
 }
 
+/// A moving mean along columns, wrapping likewise.
 fn box_columns(from: &[f32], to: &mut Vec<f32>, [width, height]: [usize; 2], radius: usize) {
     to.resize(width * height, 0.0);
     let share = 1.0 / (2 * radius + 1) as f32;
     for y in 0..height {
-        let out = &mut to[y * width..(y + 1) * width];
-        out.fill(0.0);
-        for k in 0..=2 * radius {
-            let row = wrapped(y + k, radius, height) * width;
-            for (sum, value) in out.iter_mut().zip(&from[row..row + width]) {
-                *sum += value * share;
-            }
-        }
+        let rows = (0..=2 * radius).map(|k| &from[(y + k + height - radius) % height * width..]);
+        add_shifted(&mut to[y * width..(y + 1) * width], share, rows);
     }
 }
 
-/// `at - radius` on a circle: wrapping keeps the variance at the border.
-fn wrapped(at: usize, radius: usize, size: usize) -> usize {
-    (at + size - radius) % size
+fn add_shifted<'a>(out: &mut [f32], share: f32, terms: impl Iterator<Item = &'a [f32]>) {
+    out.fill(0.0);
+    for term in terms {
+        for (sum, value) in out.iter_mut().zip(term) {
+            *sum += value * share;
+        }
+    }
 }
 
 /// The value below minus which a standard normal falls with this probability; enough for shares of 1e-4 to 0.1.

@@ -47,7 +47,7 @@ impl StructuredLight {
                 let matched = x as f32 - focal_baseline / truth_m;
                 let hidden = matched > nearest_match + 0.5;
                 nearest_match = nearest_match.min(matched);
-                let incidence = view.cos_incidence(pixel).acos();
+                let incidence = view.incidence_rad[pixel];
                 let dark = view.reflectance[pixel] < self.least_reflectance;
                 if hidden || dark || incidence > self.most_incidence_rad {
                     continue;

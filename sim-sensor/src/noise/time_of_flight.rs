@@ -22,7 +22,7 @@ pub struct TimeOfFlight {
 }
 
 /// Random draws for one pixel: one counter each.
-const DRAWS: u64 = 8;
+const DRAWS: u64 = 4;
 
 impl TimeOfFlight {
     pub fn azure(model: SensorModel) -> Self {
@@ -58,36 +58,44 @@ impl TimeOfFlight {
             return 0.0;
         }
         let truth_m = view.depth_m[pixel];
-        let ideal_m = if around.max_m - around.min_m > self.mixing_step_m {
-            // The silhouette crosses this pixel about half of the time, and then anywhere.
-            let covered = random.between(at, -0.5, 0.5);
-            if covered > 0.0 {
-                if random.uniform(at + 1) < self.mixed_noticed_share {
-                    return 0.0;
-                }
-                let other_m = if truth_m - around.min_m > around.max_m - truth_m {
-                    around.min_m
-                } else {
-                    around.max_m
-                };
-                truth_m + (other_m - truth_m) * covered
-            } else {
-                truth_m
-            }
+        let (ideal_m, slope) = if around.max_m - around.min_m > self.mixing_step_m {
+            (self.mixed(truth_m, around, random, at), 0.0)
         } else {
-            let shift = [random.gaussian(at + 2), random.gaussian(at + 3)];
-            truth_m + self.shift_px * (around.slope_x * shift[0] + around.slope_y * shift[1])
+            (truth_m, around.slope_m_per_px())
         };
-        let cosine = view.cos_incidence(pixel);
-        let signal = view.reflectance[pixel] * cosine / (ideal_m * ideal_m);
-        if signal < self.least_signal * random.between(at + 4, 0.6, 1.4) {
+        if ideal_m <= 0.0 {
             return 0.0;
         }
-        ideal_m + self.model.sigma_m(ideal_m, cosine.acos()) * random.gaussian(at + 5)
+        let signal = view.reflectance[pixel] * view.cosine[pixel] / (ideal_m * ideal_m);
+        let [hopeless, sufficient] = [0.6, 1.4].map(|share| share * self.least_signal);
+        let lost = signal < sufficient
+            && (signal < hopeless || signal < random.between(at + 2, hopeless, sufficient));
+        if lost {
+            return 0.0;
+        }
+        // Looking a little aside shifts depth along the slope: one more normal error beside the axial one.
+        let aside_m = self.shift_px * slope;
+        let axial_m = self.model.sigma_m(ideal_m, view.incidence_rad[pixel]);
+        ideal_m + axial_m.hypot(aside_m) * random.gaussian(at + 3)
+    }
+
+    /// A pixel beside an edge: the silhouette crosses it about half of the time, and then anywhere.
+    fn mixed(&self, truth_m: f32, around: Neighbourhood, random: Randomness, at: u64) -> f32 {
+        let covered = random.between(at, -0.5, 0.5);
+        if covered <= 0.0 {
+            return truth_m;
+        }
+        if random.uniform(at + 1) < self.mixed_noticed_share {
+            return 0.0;
+        }
+        let nearer = truth_m - around.min_m > around.max_m - truth_m;
+        let other_m = if nearer { around.min_m } else { around.max_m };
+        truth_m + (other_m - truth_m) * covered
     }
 }
 
 /// The depths around a pixel.
+#[derive(Clone, Copy)]
 struct Neighbourhood {
     min_m: f32,
     max_m: f32,
@@ -97,6 +105,10 @@ struct Neighbourhood {
 }
 
 impl Neighbourhood {
+    fn slope_m_per_px(self) -> f32 {
+        self.slope_x.hypot(self.slope_y)
+    }
+
     fn of(view: &View, x: usize, y: usize) -> Self {
         let at = |x: usize, y: usize| view.depth_m[y * view.width + x];
         let centre = at(x, y);

@@ -40,7 +40,7 @@ pub(super) struct Chart {
 }
 
 impl Chart {
-    pub(super) fn new(body: &BodyModel, vertices: Vec<Vec3>, joints: [Vec3; JOINT_COUNT]) -> Self {
+    pub(super) fn new(body: &BodyModel, vertices: Vec<Vec3>, joints: &[Vec3; JOINT_COUNT]) -> Self {
         let normals = vertex_normals(&vertices, &body.triangles);
         let neighbours = Neighbours::of(vertices.len(), &body.triangles);
         let smoothed = neighbours.smoothed(&vertices, 14);
@@ -50,7 +50,7 @@ impl Chart {
             .map(|v| (wide[v] - vertices[v]).dot(normals[v]).clamp(0.0, 0.03))
             .collect();
         let places: Vec<Place> = (0..vertices.len())
-            .map(|v| Place::of(body, v, vertices[v], &joints))
+            .map(|v| Place::of(body, v, vertices[v], joints))
             .collect();
         let heights = |of: &dyn Fn(&Place) -> bool| -> Vec<f32> {
             let chosen = vertices.iter().zip(&places).filter(|(_, place)| of(place));
@@ -64,7 +64,16 @@ impl Chart {
         let head_top_y = heights(&|place| place.head_share > 0.5)
             .into_iter()
             .fold(f32::MIN, f32::max);
-        Self { vertices, normals, smooth_normals, hollow_m, joints, places, sole_y, head_top_y }
+        Self {
+            vertices,
+            normals,
+            smooth_normals,
+            hollow_m,
+            joints: *joints,
+            places,
+            sole_y,
+            head_top_y,
+        }
     }
 }
 

@@ -20,10 +20,11 @@ mod identity;
 mod outfit;
 mod paint;
 mod tailor;
+mod wrinkles;
 
 pub use identity::sample_betas;
 pub use outfit::{Garment, Outfit, OutfitKind, Shoes};
-pub use paint::Paint;
+pub use paint::{Material, Paint};
 
 use chart::Chart;
 use tailor::Tailoring;
@@ -47,9 +48,9 @@ impl Person {
     pub fn new(body: Arc<BodyModel>, betas: [f32; 10], outfit: Outfit, seed: u64) -> Self {
         let minimal = body.shaped_vertices(&betas);
         let rest_joints = body.joints(&minimal);
-        let chart = Chart::new(&body, minimal.clone(), rest_joints);
+        let chart = Chart::new(&body, minimal.clone(), &rest_joints);
         let tailoring = Tailoring::new(&chart, &outfit, seed);
-        let paint = Paint::new(&chart, &tailoring, seed);
+        let paint = Paint::new(&tailoring, seed);
         Self { body, betas, rest_joints, outfit, paint, minimal, tailoring }
     }
 
@@ -70,7 +71,7 @@ impl Person {
     pub fn clothed_zero_pose(&self, theta: &[Vec3; JOINT_COUNT]) -> Vec<Vec3> {
         let mut vertices = self.minimal_zero_pose(theta);
         self.tailoring
-            .dress(&mut vertices, theta, &self.rest_joints, &self.body.skinning);
+            .dress(&mut vertices, theta, &self.body.skinning);
         vertices
     }
 
@@ -103,18 +104,18 @@ impl Person {
     pub fn mesh(&self, vertices: Vec<Vec3>) -> TriangleMesh {
         let mut mesh = TriangleMesh::new(vertices, self.body.triangles.clone());
         mesh.compute_normals();
-        mesh.colors.clone_from(&self.paint.colors);
+        mesh.colors = self.paint.vertex_colors();
         mesh
     }
 
     /// What a motion needs to know to put these feet (with their shoes) on the floor.
     pub fn rest_body(&self) -> RestBody {
         let standing = self.clothed_zero_pose(&[Vec3::ZERO; JOINT_COUNT]);
-        RestBody::with_surface(&self.body, self.rest_joints, &standing)
+        RestBody::with_surface(&self.body, &self.rest_joints, &standing)
     }
 
-    pub fn params(&self, theta: [Vec3; JOINT_COUNT], trans: Vec3) -> BodyParams {
-        BodyParams { betas: self.betas, theta, trans }
+    pub fn params(&self, theta: &[Vec3; JOINT_COUNT], trans: Vec3) -> BodyParams {
+        BodyParams { betas: self.betas, theta: *theta, trans }
     }
 
     /// The minimal body's height, standing in the zero pose.

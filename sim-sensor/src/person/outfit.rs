@@ -90,7 +90,7 @@ impl Outfit {
             sag: 0.2,
         };
         let trousers = Garment {
-            limb_end: 1.90,
+            limb_end: 1.97,
             trunk_end_m: 0.09,
             trunk_ease_m: 0.004,
             limb_ease_m: 0.005,
@@ -105,7 +105,7 @@ impl Outfit {
     fn loose() -> Self {
         let shirt = Garment {
             limb_end: 1.88,
-            trunk_end_m: 0.09,
+            trunk_end_m: 0.035,
             trunk_ease_m: 0.020,
             limb_ease_m: 0.020,
             flare_m: 0.014,
@@ -114,7 +114,7 @@ impl Outfit {
             sag: 0.75,
         };
         let trousers = Garment {
-            limb_end: 1.92,
+            limb_end: 1.985,
             trunk_end_m: 0.09,
             trunk_ease_m: 0.012,
             limb_ease_m: 0.022,

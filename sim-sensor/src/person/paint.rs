@@ -1,79 +1,91 @@
 //! What the person looks like to a colour camera and to infrared light.
 
-use super::{chart::Chart, tailor::Tailoring};
+use glam::{Vec3, Vec4, vec4};
+
+use super::tailor::Tailoring;
 use crate::random::Randomness;
 
-/// For each vertex: sRGB colour, and the share of infrared light it returns.
+/// Which material is seen where. Covers are interpolated over triangles and cut at one half, so that edges of
+/// garments are as sharp as the image.
 #[derive(Clone, Debug)]
 pub struct Paint {
-    pub colors: Vec<[u8; 3]>,
-    pub reflectance: Vec<f32>,
+    /// Shares of trousers, shirt, shoe and hair at each vertex.
+    covers: Vec<Vec4>,
+    skin: Material,
+    layers: [Material; 4],
 }
 
-/// A colour and its infrared reflectance, which is often far from its brightness.
-#[derive(Clone, Copy)]
-struct Material {
-    color: [f32; 3],
-    reflectance: f32,
+/// An sRGB colour, and the share of infrared light returned, which is often far from the brightness.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Material {
+    pub color: [u8; 3],
+    pub reflectance: f32,
 }
 
 const SKINS: [Material; 4] = [
-    Material { color: [231.0, 190.0, 165.0], reflectance: 0.60 },
-    Material { color: [205.0, 155.0, 122.0], reflectance: 0.58 },
-    Material { color: [150.0, 104.0, 78.0], reflectance: 0.52 },
-    Material { color: [98.0, 66.0, 50.0], reflectance: 0.45 },
+    Material { color: [231, 190, 165], reflectance: 0.60 },
+    Material { color: [205, 155, 122], reflectance: 0.58 },
+    Material { color: [160, 112, 84], reflectance: 0.52 },
+    Material { color: [112, 76, 58], reflectance: 0.45 },
 ];
 const SHIRTS: [Material; 6] = [
-    Material { color: [62.0, 104.0, 160.0], reflectance: 0.60 },
-    Material { color: [178.0, 66.0, 62.0], reflectance: 0.65 },
-    Material { color: [226.0, 222.0, 212.0], reflectance: 0.85 },
-    Material { color: [72.0, 132.0, 104.0], reflectance: 0.60 },
-    Material { color: [206.0, 164.0, 72.0], reflectance: 0.70 },
-    Material { color: [52.0, 50.0, 56.0], reflectance: 0.35 },
+    Material { color: [62, 104, 160], reflectance: 0.60 },
+    Material { color: [178, 66, 62], reflectance: 0.65 },
+    Material { color: [226, 222, 212], reflectance: 0.85 },
+    Material { color: [72, 132, 104], reflectance: 0.60 },
+    Material { color: [206, 164, 72], reflectance: 0.70 },
+    Material { color: [92, 88, 98], reflectance: 0.35 },
 ];
 const TROUSERS: [Material; 4] = [
-    Material { color: [58.0, 66.0, 92.0], reflectance: 0.50 },
-    Material { color: [118.0, 104.0, 84.0], reflectance: 0.60 },
-    Material { color: [70.0, 72.0, 74.0], reflectance: 0.40 },
-    Material { color: [44.0, 46.0, 58.0], reflectance: 0.45 },
+    Material { color: [68, 78, 108], reflectance: 0.50 },
+    Material { color: [128, 114, 92], reflectance: 0.60 },
+    Material { color: [84, 86, 90], reflectance: 0.40 },
+    Material { color: [54, 58, 72], reflectance: 0.45 },
 ];
 const HAIR: [Material; 4] = [
-    Material { color: [40.0, 30.0, 26.0], reflectance: 0.14 },
-    Material { color: [86.0, 58.0, 38.0], reflectance: 0.20 },
-    Material { color: [172.0, 136.0, 84.0], reflectance: 0.32 },
-    Material { color: [24.0, 22.0, 24.0], reflectance: 0.10 },
+    Material { color: [46, 34, 30], reflectance: 0.14 },
+    Material { color: [92, 62, 40], reflectance: 0.20 },
+    Material { color: [172, 136, 84], reflectance: 0.32 },
+    Material { color: [28, 26, 28], reflectance: 0.10 },
 ];
-const SHOES: Material = Material { color: [66.0, 58.0, 56.0], reflectance: 0.30 };
+const SHOES: Material = Material { color: [66, 58, 56], reflectance: 0.30 };
 
 impl Paint {
-    pub(super) fn new(chart: &Chart, tailoring: &Tailoring, seed: u64) -> Self {
+    pub(super) fn new(tailoring: &Tailoring, seed: u64) -> Self {
         let random = Randomness::new(seed, 0, 0xc0);
-        let skin = pick(&SKINS, random, 0);
-        let shirt = pick(&SHIRTS, random, 1);
-        let trousers = pick(&TROUSERS, random, 2);
-        let hair = pick(&HAIR, random, 3);
-        let materials: Vec<Material> = tailoring
-            .cuts
-            .iter()
-            .map(|cut| {
-                skin.over(trousers, cut.trousers)
-                    .over(shirt, cut.shirt)
-                    .over(SHOES, cut.shoe)
-                    .over(hair, cut.hair)
-            })
-            .collect();
-        debug_assert_eq!(materials.len(), chart.vertices.len());
+        let covers = tailoring.cuts.iter();
         Self {
-            colors: materials.iter().map(|m| m.color.map(|c| c as u8)).collect(),
-            reflectance: materials.iter().map(|m| m.reflectance).collect(),
+            covers: covers
+                .map(|cut| vec4(cut.trousers, cut.shirt, cut.shoe, cut.hair))
+                .collect(),
+            skin: pick(&SKINS, random, 0),
+            layers: [
+                pick(&TROUSERS, random, 2),
+                pick(&SHIRTS, random, 1),
+                SHOES,
+                pick(&HAIR, random, 3),
+            ],
         }
     }
-}
 
-impl Material {
-    /// With another on top of it where that covers more than half.
-    fn over(self, top: Self, cover: f32) -> Self {
-        if cover > 0.5 { top } else { self }
+    /// The material at a point of a triangle.
+    pub fn at(&self, corners: [usize; 3], weights: Vec3) -> Material {
+        let cover: Vec4 = (0..3).map(|k| self.covers[corners[k]] * weights[k]).sum();
+        self.outermost(cover)
+    }
+
+    pub fn vertex_colors(&self) -> Vec<[u8; 3]> {
+        self.covers
+            .iter()
+            .map(|&cover| self.outermost(cover).color)
+            .collect()
+    }
+
+    fn outermost(&self, cover: Vec4) -> Material {
+        (0..4)
+            .rev()
+            .find(|&k| cover[k] > 0.5)
+            .map_or(self.skin, |k| self.layers[k])
     }
 }
 

@@ -8,6 +8,7 @@ use super::{
     chart::{Chart, Place},
     folds::{Folds, SHIRT_JOINTS, TROUSER_JOINTS},
     outfit::{Garment, MIN_CLOTH_M, Outfit, Shoes},
+    wrinkles::Wrinkles,
 };
 use crate::random::Randomness;
 
@@ -15,6 +16,9 @@ use crate::random::Randomness;
 const HEM_M: f32 = 0.018;
 /// Tight cloth keeps this share of its ease.
 const TIGHT_EASE: f32 = 0.4;
+/// The collar's plane: its normal, and its height over the neck joint.
+const COLLAR_UP: Vec3 = Vec3::new(0.0, 0.92, 0.39);
+const COLLAR_M: f32 = 0.012;
 /// Room kept between a leg's cloth and the body's middle plane.
 const MIDLINE_GAP_M: f32 = 0.003;
 
@@ -48,9 +52,9 @@ pub(super) struct Tailoring {
 impl Tailoring {
     pub(super) fn new(chart: &Chart, outfit: &Outfit, seed: u64) -> Self {
         let random = |purpose| Randomness::new(seed, 0, purpose);
-        let lumps = Lumps::new(random(0x51));
+        let wrinkles = Wrinkles::new(random(0x51));
         let cuts = (0..chart.vertices.len())
-            .map(|v| cut(chart, v, outfit, &lumps))
+            .map(|v| cut(chart, v, outfit, &wrinkles))
             .collect();
         let folded = |garment: Option<Garment>, joints, purpose| {
             garment.map(|g| (g, Folds::new(chart, &g, joints, random(purpose))))
@@ -67,7 +71,6 @@ impl Tailoring {
         &self,
         vertices: &mut [Vec3],
         theta: &[Vec3; JOINT_COUNT],
-        _rest_joints: &[Vec3; JOINT_COUNT],
         skinning: &[VertexWeights],
     ) {
         let bends = bends(theta);
@@ -137,9 +140,8 @@ fn gravity_in_rest(bends: &[Mat3; JOINT_COUNT]) -> [Vec3; JOINT_COUNT] {
     world_from_bone.map(|rotation| rotation.transpose() * Vec3::NEG_Y)
 }
 
-fn cut(chart: &Chart, v: usize, outfit: &Outfit, lumps: &Lumps) -> Cut {
+fn cut(chart: &Chart, v: usize, outfit: &Outfit, wrinkles: &Wrinkles) -> Cut {
     let place = &chart.places[v];
-    let vertex = chart.vertices[v];
     let normal = chart.normals[v];
     let blended = (chart.smooth_normals[v] + normal * 0.5).normalize_or(normal);
     let direction = if blended.dot(normal) > 0.5 {
@@ -155,28 +157,32 @@ fn cut(chart: &Chart, v: usize, outfit: &Outfit, lumps: &Lumps) -> Cut {
         .trousers
         .as_ref()
         .map_or(0.0, |g| trouser_cover(g, chart, v));
-    let lump = lumps.at(vertex);
     let hollow_m = chart.hollow_m[v];
+    let lump = wrinkles.lump(chart.vertices[v]);
+    let wrinkle =
+        |garment: &Garment, of_garment: f32| garment.drape(hollow_m, 0.4 * lump + of_garment);
     let mut cut = Cut { direction, room_m: f32::MAX, shirt, trousers, ..Cut::default() };
     if let Some(garment) = &outfit.trousers {
-        let ease = garment.limb_share(place.leg, place.leg_share) + garment.drape(hollow_m, lump);
+        let ease = garment.limb_share(place.leg, place.leg_share)
+            + wrinkle(garment, wrinkles.trousers(chart, v));
         cut.ease_m = trousers * ease;
         cut.sag = garment.sag * trousers;
         cut.room_m = room_to_midline_m(chart, v, direction);
     }
     if let Some(garment) = &outfit.shirt {
         let hem = smoothstep(0.25, -0.10, place.trunk) * garment.flare_m * (1.0 - place.arm_share);
-        let ease =
-            garment.limb_share(place.arm, place.arm_share) + hem + garment.drape(hollow_m, lump);
+        let ease = garment.limb_share(place.arm, place.arm_share)
+            + hem
+            + wrinkle(garment, wrinkles.shirt(chart, v));
         cut.ease_m += shirt * ((cut.ease_m + MIN_CLOTH_M).max(ease) - cut.ease_m);
         cut.sag += shirt * (garment.sag - cut.sag);
     }
-    if let Some(shoes) = &outfit.shoes {
+    if let Some(shoes) = outfit.shoes {
         dress_foot(&mut cut, chart, v, shoes);
     }
     if outfit.hair_m > 0.0 {
         cut.hair = hair_cover(chart, v);
-        cut.fixed += normal * cut.hair * outfit.hair_m * (1.0 + 8.0 * lump.clamp(-0.06, 0.06));
+        cut.fixed += normal * cut.hair * outfit.hair_m * (1.0 + 0.5 * lump);
     }
     cut
 }
@@ -191,7 +197,7 @@ impl Garment {
     /// Hollows that cloth spans, and its small irregularities; loose cloth has more of both.
     fn drape(&self, hollow_m: f32, lump: f32) -> f32 {
         let looseness = (self.trunk_ease_m / 0.016).min(1.3);
-        hollow_m * looseness.min(1.0) + lump * self.fold_m * 0.5
+        hollow_m * looseness.min(1.0) + lump * self.fold_m
     }
 }
 
@@ -206,8 +212,10 @@ fn shirt_cover(garment: &Garment, chart: &Chart, v: usize) -> f32 {
         HEM_M,
         chart.vertices[v].y - (hip_y - garment.trunk_end_m),
     );
-    let neck = smoothstep(0.55, 0.20, place.head_share);
-    sleeve * hem * neck
+    // The collar lies in a plane through the base of the neck, lower in front.
+    let above_collar_m = (chart.vertices[v] - chart.joints[12]).dot(COLLAR_UP);
+    let collar = smoothstep(COLLAR_M + HEM_M, COLLAR_M, above_collar_m);
+    sleeve * hem * collar
 }
 
 /// Trousers cover everything from the waist to their legs' ends, hands excepted.
@@ -246,11 +254,11 @@ fn room_to_midline_m(chart: &Chart, v: usize, direction: Vec3) -> f32 {
 }
 
 /// Uppers follow the foot, soles are flat.
-fn dress_foot(cut: &mut Cut, chart: &Chart, v: usize, shoes: &Shoes) {
+fn dress_foot(cut: &mut Cut, chart: &Chart, v: usize, shoes: Shoes) {
     let place = &chart.places[v];
     let ankle = chart.joints[7 + place.side];
     let vertex = chart.vertices[v];
-    let below = smoothstep(0.015, -0.010, vertex.y - ankle.y);
+    let below = smoothstep(0.045, 0.020, vertex.y - ankle.y);
     let shoe = below * smoothstep(0.3, 0.7, place.foot_share);
     if shoe <= 0.0 {
         return;
@@ -262,6 +270,9 @@ fn dress_foot(cut: &mut Cut, chart: &Chart, v: usize, shoes: &Shoes) {
     let on_sole = smoothstep(0.024, 0.004, vertex.y - sole_y);
     let flat_y = sole_y - shoes.sole_m - vertex.y;
     offset.y += (flat_y - offset.y) * on_sole;
+    // Between toes the smoothed normal points anywhere; a shoe never goes into the foot.
+    let outwards_m = offset.dot(chart.normals[v]);
+    offset += chart.normals[v] * (MIN_CLOTH_M - outwards_m).max(0.0);
     cut.fixed += offset * shoe;
 }
 
@@ -275,33 +286,6 @@ fn hair_cover(chart: &Chart, v: usize) -> f32 {
     let height = (chart.head_top_y - head.y).max(0.05);
     let at = (chart.vertices[v] - head) / height;
     smoothstep(0.0, 0.08, 0.62 * (at.y - 0.50) - 0.75 * (at.z - 0.18))
-}
-
-/// Slow irregularities in space, about -0.5 to 0.5.
-struct Lumps([(Vec3, f32); 5]);
-
-impl Lumps {
-    fn new(random: Randomness) -> Self {
-        Self(std::array::from_fn(|i| {
-            let at = 8 * i as u64;
-            let axis = Vec3::new(
-                random.gaussian(at),
-                random.gaussian(at + 1),
-                random.gaussian(at + 2),
-            );
-            let wavelength_m = random.between(at + 3, 0.10, 0.22);
-            let wave = axis.normalize_or(Vec3::Y) * (std::f32::consts::TAU / wavelength_m);
-            (wave, random.between(at + 4, 0.0, std::f32::consts::TAU))
-        }))
-    }
-
-    fn at(&self, point: Vec3) -> f32 {
-        self.0
-            .iter()
-            .map(|(wave, phase)| (wave.dot(point) + phase).sin())
-            .sum::<f32>()
-            * 0.25
-    }
 }
 
 /// 0 at `from`, 1 at `to` (which may be the smaller one), smooth between.

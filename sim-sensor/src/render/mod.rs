@@ -24,6 +24,9 @@ pub struct View {
     pub depth_m: Vec<f32>,
     /// Unit normals towards the camera; zero where there is nothing.
     pub normals: Vec<Vec3>,
+    /// Angle between ray and normal, and its cosine; both 0 where there is nothing.
+    pub incidence_rad: Vec<f32>,
+    pub cosine: Vec<f32>,
     pub labels: Vec<Label>,
     /// Share of infrared light that comes back.
     pub reflectance: Vec<f32>,
@@ -97,9 +100,11 @@ impl Renderer {
                 .sum();
             view.depth_m[pixel] = depth_m;
             view.normals[pixel] = normal.normalize_or(Vec3::NEG_Z);
+            view.measure_incidence(pixel);
             view.labels[pixel] = Label::of_weights(&skinning[nearest]);
-            view.reflectance[pixel] = paint.reflectance[nearest];
-            view.colors[pixel] = paint.colors[nearest];
+            let material = paint.at(corners, weights);
+            view.reflectance[pixel] = material.reflectance;
+            view.colors[pixel] = material.color;
             self.drawn.push(pixel);
         }
         &self.view
@@ -110,6 +115,8 @@ impl Renderer {
         for &pixel in &self.drawn {
             self.view.depth_m[pixel] = self.empty_room.depth_m[pixel];
             self.view.normals[pixel] = self.empty_room.normals[pixel];
+            self.view.incidence_rad[pixel] = self.empty_room.incidence_rad[pixel];
+            self.view.cosine[pixel] = self.empty_room.cosine[pixel];
             self.view.labels[pixel] = self.empty_room.labels[pixel];
             self.view.reflectance[pixel] = self.empty_room.reflectance[pixel];
             self.view.colors[pixel] = self.empty_room.colors[pixel];
@@ -135,10 +142,12 @@ impl View {
         (depth_m > 0.0).then(|| self.ray(pixel) * depth_m)
     }
 
-    /// Cosine of the angle between a pixel's ray and the normal there; 0 where there is nothing.
-    pub fn cos_incidence(&self, pixel: usize) -> f32 {
+    /// Sets a pixel's angle of incidence from its normal.
+    pub fn measure_incidence(&mut self, pixel: usize) {
         let ray = self.ray(pixel);
-        (-self.normals[pixel].dot(ray) / ray.length()).clamp(0.0, 1.0)
+        let cosine = -self.normals[pixel].dot(ray) * ray.length_recip();
+        self.cosine[pixel] = cosine.clamp(0.0, 1.0);
+        self.incidence_rad[pixel] = self.cosine[pixel].acos();
     }
 
     /// The colour image: a lamp above the camera's left shoulder, some light from everywhere.

@@ -26,6 +26,8 @@ pub(super) fn draw(camera: Intrinsics, world_from_camera: Rigid3, room: Room) ->
         height: camera.height as usize,
         depth_m: vec![0.0; count],
         normals: vec![Vec3::ZERO; count],
+        incidence_rad: vec![0.0; count],
+        cosine: vec![0.0; count],
         labels: vec![Label::Nothing; count],
         reflectance: vec![0.0; count],
         colors: vec![[0; 3]; count],
@@ -47,6 +49,7 @@ pub(super) fn draw(camera: Intrinsics, world_from_camera: Rigid3, room: Room) ->
             }
             view.depth_m[pixel] = depth_m;
             view.normals[pixel] = world_from_camera.inverse().rotate(normal);
+            view.measure_incidence(pixel);
             view.labels[pixel] = surface.label;
             view.reflectance[pixel] = surface.reflectance;
             view.colors[pixel] = checked(surface, world_from_camera * (view.ray(pixel) * depth_m));

@@ -11,6 +11,8 @@ use super::{Motion, RestBody, retarget};
 use crate::error::RegistrationError;
 
 mod parse;
+#[cfg(test)]
+mod tests;
 
 /// The largest file accepted; twenty minutes of a full skeleton at 120 Hz take half of it.
 pub const MAX_BYTES: u64 = 256 << 20;

@@ -5,7 +5,7 @@ use glam::{Vec2, Vec3, vec2};
 use super::{Arm, Foot, RestBody, Stance};
 
 /// Toes point outwards by this much when one stands at ease.
-const TOE_OUT_RAD: f32 = 0.14;
+const TOE_OUT_RAD: f32 = 0.06;
 const BREATHS_PER_SEC: f32 = 0.27;
 
 /// Seeded variation; one for each performance.

@@ -1,0 +1,144 @@
+//! What sensor and truth claim together.
+
+use effigy_fusion::mesh::closest_point::ClosestPoint;
+use effigy_registration::{motion::Routine, smpl::builtin};
+use glam::Vec3;
+
+use super::*;
+use crate::{
+    person::OutfitKind,
+    preset::SensorPreset,
+    scenario::{MotionChoice, Room},
+    truth::Truth,
+};
+
+fn scenario(sensor: SensorPreset, routine: Routine) -> Scenario {
+    Scenario { sensor, motion: MotionChoice::Routine(routine), ..Scenario::default() }
+}
+
+#[test]
+fn noiseless_depth_lies_on_the_clothed_surface() {
+    for preset in [SensorPreset::Azure, SensorPreset::D435] {
+        let scenario = Scenario {
+            noise: Noise::None,
+            room: Room::Empty,
+            outfit: OutfitKind::Loose,
+            ..scenario(preset, Routine::Mixture)
+        };
+        let mut sensor = SimulatedSensor::new(&scenario, builtin::body()).unwrap();
+        let truth = Truth::new(&scenario, builtin::body())
+            .unwrap()
+            .at(FrameId(140));
+        let frame = sensor.expose(FrameId(140)).unwrap();
+        let surface = ClosestPoint::from_mesh(&truth.clothed_in_world).unwrap();
+        let camera = sensor.calibration().depth.intrinsics;
+        let mut seen = 0;
+        for (pixel, &raw) in frame.depth.pixels().iter().enumerate() {
+            if raw == 0 || pixel % 7 != 0 {
+                continue;
+            }
+            let at = glam::vec2(
+                (pixel as u32 % camera.width) as f32,
+                (pixel as u32 / camera.width) as f32,
+            );
+            let point = truth.world_from_camera * camera.unproject(at, f32::from(raw) * 0.001);
+            let distance_m = surface.query(point).distance;
+            assert!(
+                distance_m < 0.001,
+                "half a millimetre of rounding, not {distance_m} m"
+            );
+            seen += 1;
+        }
+        assert!(seen > 2000, "a person fills {seen} of every seventh pixel");
+    }
+}
+
+#[test]
+fn frames_repeat_bit_for_bit_and_do_not_depend_on_order() {
+    let scenario = scenario(SensorPreset::D435, Routine::Wave);
+    let mut one = SimulatedSensor::new(&scenario, builtin::body()).unwrap();
+    let mut other = SimulatedSensor::new(&scenario, builtin::body()).unwrap();
+    let in_order: Vec<_> = (0..3).map(|_| one.next_frame().unwrap().unwrap()).collect();
+    for id in [2, 0, 1] {
+        let frame = other.expose(FrameId(id)).unwrap();
+        assert_eq!(*frame.depth, *in_order[id as usize].depth);
+        assert_eq!(frame.timestamp, in_order[id as usize].timestamp);
+    }
+}
+
+#[test]
+fn dropped_frames_leave_gaps_and_the_count_knows_it() {
+    let scenario = Scenario {
+        seconds: 1.0,
+        dropped_share: 0.3,
+        noise: Noise::None,
+        ..scenario(SensorPreset::Oak, Routine::Stand)
+    };
+    let mut sensor = SimulatedSensor::new(&scenario, builtin::body()).unwrap();
+    let mut ids = Vec::new();
+    while let Some(frame) = sensor.next_frame().unwrap() {
+        ids.push(frame.id.0);
+    }
+    assert_eq!(ids.len() as u64, sensor.frame_count().unwrap());
+    assert!(
+        ids.len() > 10 && ids.len() < 30,
+        "about 30 % of 30 are missing: {ids:?}"
+    );
+    assert!(ids.is_sorted() && ids[0] == 0);
+}
+
+/// Betas of the tallest of some people.
+fn tallest() -> [f32; 10] {
+    let body = builtin::body();
+    let height = |betas: &[f32; 10]| {
+        let ys = body.shaped_vertices(betas).into_iter().map(|v| v.y);
+        ys.clone().fold(f32::MIN, f32::max) - ys.fold(f32::MAX, f32::min)
+    };
+    let people = (0..60).map(|seed| crate::person::sample_betas(&body, seed));
+    people
+        .max_by(|a, b| height(a).total_cmp(&height(b)))
+        .unwrap()
+}
+
+#[test]
+fn the_whole_body_is_in_view_and_on_the_floor() {
+    let betas = Some(tallest());
+    for routine in Routine::ALL {
+        for preset in SensorPreset::ALL {
+            let outfit = OutfitKind::Loose;
+            let scenario = Scenario { outfit, betas, ..scenario(preset, routine) };
+            let scene = Scene::new(&scenario, builtin::body()).unwrap();
+            let camera = scene.calibration.depth.intrinsics;
+            let frames = (scene.motion_secs() * 30.0) as u64;
+            for frame in (0..frames).step_by(23) {
+                let pose = scene.pose(FrameId(frame));
+                let mesh = scene.person.clothed_posed(&pose.theta, pose.trans);
+                let lowest_m = mesh.vertices.iter().map(|v| v.y).fold(f32::MAX, f32::min);
+                assert!(
+                    lowest_m.abs() < 0.006,
+                    "{routine:?}: stands {lowest_m} m over the floor"
+                );
+                for vertex in &mesh.vertices {
+                    let in_camera = scene.world_from_camera.inverse() * *vertex;
+                    assert_in_image(in_camera, &camera, routine, preset);
+                }
+            }
+        }
+    }
+}
+
+fn assert_in_image(
+    point: Vec3,
+    camera: &effigy_capture::Intrinsics,
+    routine: Routine,
+    preset: SensorPreset,
+) {
+    let pixel = camera.project(point);
+    let (width, height) = (camera.width as f32, camera.height as f32);
+    let inside = pixel.x > 2.0 && pixel.x < width - 3.0 && pixel.y > 2.0 && pixel.y < height - 3.0;
+    assert!(
+        inside,
+        "{routine:?} on {}: {point} falls on {pixel}",
+        preset.name()
+    );
+}
