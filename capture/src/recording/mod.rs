@@ -11,6 +11,7 @@ mod info;
 mod outline;
 mod player;
 mod reader;
+mod recorder;
 mod records;
 mod scan;
 mod sink;
