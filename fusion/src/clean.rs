@@ -11,6 +11,7 @@ use crate::{
         fill::{self, FillConfig, Filled},
         flying_pixels::{FlyingPixelConfig, drop_flying_pixels},
         segment::{Body, SegmentConfig, Segmentation, Segmenter},
+        sigma::SigmaTable,
         tolerance::Tolerance,
     },
     error::FusionError,
@@ -89,6 +90,7 @@ pub struct Cleaner {
     config: CleanConfig,
     rays: Rays,
     tolerance: Tolerance,
+    sigmas: SigmaTable,
     segmenter: Segmenter,
     bilateral: Bilateral,
     bodies: Vec<Body>,
@@ -101,6 +103,7 @@ impl Cleaner {
         let rays = Rays::new(&calibration.depth);
         Self {
             tolerance: Tolerance::new(calibration.sensor, &calibration.depth.intrinsics),
+            sigmas: SigmaTable::new(calibration.sensor),
             segmenter: Segmenter::new(&rays, config.segment.clone()),
             bilateral: Bilateral::new(&config.bilateral),
             bodies: Vec::new(),
@@ -175,7 +178,8 @@ impl Cleaner {
         );
         self.bilateral
             .smooth(depth, region, person, &self.tolerance);
-        for (person, depth_m) in person.iter_mut().zip(&depth.metres) {
+        let rows = region.rows.start * depth.width..region.rows.end * depth.width;
+        for (person, depth_m) in person[rows.clone()].iter_mut().zip(&depth.metres[rows]) {
             *person &= !depth_m.is_nan();
         }
         let filled = fill::fill_holes(depth, person, region, &self.tolerance, &self.config.fill);
@@ -209,23 +213,15 @@ impl Cleaner {
         let width = vertices.width;
         let mut sigma_m = vec![f32::NAN; vertices.points.len()];
         let rows = region.rows.start * width..region.rows.end * width;
-        let sensor = self.calibration.sensor;
         sigma_m[rows]
             .par_chunks_mut(width)
             .enumerate()
             .for_each(|(row, sigmas)| {
                 for x in region.columns.clone() {
                     let pixel = (region.rows.start + row) * width + x;
-                    let (point, normal) = (vertices.points[pixel], normals.normals[pixel]);
+                    let point = vertices.points[pixel];
                     if !point.z.is_nan() {
-                        let cosine = -point.dot(normal) / point.length();
-                        // Without a normal: an edge, so as if seen at a grazing angle.
-                        let incidence_rad = if cosine.is_nan() {
-                            1.4
-                        } else {
-                            cosine.clamp(0.0, 1.0).acos()
-                        };
-                        sigmas[x] = sensor.sigma_m(point.z, incidence_rad);
+                        sigmas[x] = self.sigmas.at(point, normals.normals[pixel]);
                     }
                 }
             });

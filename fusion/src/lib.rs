@@ -9,8 +9,10 @@ mod disjoint_sets;
 pub mod error;
 pub mod maps;
 pub mod mesh;
+pub mod tsdf;
 
 pub use clean::{CleanConfig, CleanFrame, Cleaner};
 pub use error::FusionError;
 pub use maps::{DepthMap, NormalMap, VertexMap};
 pub use mesh::TriangleMesh;
+pub use tsdf::{TsdfConfig, TsdfVolume};

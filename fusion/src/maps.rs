@@ -151,7 +151,7 @@ impl NormalMap {
         }
         let columns = region.columns.len();
         rough.clear();
-        rough.resize(columns * region.rows.len(), Vec3::NAN);
+        rough.resize(columns * region.rows.len(), Vec3::ZERO);
         rough
             .par_chunks_mut(columns)
             .enumerate()
@@ -178,13 +178,14 @@ impl NormalMap {
     }
 }
 
-/// The normal from the nearest points on the same surface left, right, above and below.
+/// A vector along the normal, from the nearest points on the same surface left, right, above and below;
+/// zero where there is none.
 fn rough_normal(vertices: &VertexMap, x: usize, y: usize) -> Vec3 {
     let (width, height) = (vertices.width, vertices.height);
     let here = y * width + x;
     let center = vertices.points[here];
     if center.z.is_nan() {
-        return Vec3::NAN;
+        return Vec3::ZERO;
     }
     let limit_m = STEP_SHARE * center.z;
     let neighbour = |inside: bool, index: usize| {
@@ -205,8 +206,7 @@ fn rough_normal(vertices: &VertexMap, x: usize, y: usize) -> Vec3 {
     let above = neighbour(y >= REACH_PX, here.wrapping_sub(REACH_PX * width));
     let below = neighbour(y + REACH_PX < height, here + REACH_PX * width);
     // Right cross down points away from the camera.
-    let normal = (below - above).cross(right - left).try_normalize();
-    normal.unwrap_or(Vec3::NAN)
+    (below - above).cross(right - left)
 }
 
 /// Rough normals of a region, ready to be smoothed.
@@ -217,24 +217,26 @@ struct Patch<'a> {
 }
 
 impl Patch<'_> {
+    /// The sum over three by three neighbours, two pixels apart, on the same surface. Larger triangles
+    /// count more: they are the ones measured over both sides.
     fn smooth_normal(&self, x: usize, y: usize) -> Vec3 {
-        let center = self.vertices.points[y * self.vertices.width + x];
-        if center.z.is_nan() {
+        let width = self.vertices.width;
+        let center = self.vertices.points[y * width + x].z;
+        if center.is_nan() {
             return Vec3::NAN;
         }
-        let limit_m = STEP_SHARE * center.z;
+        let limit_m = STEP_SHARE * center;
         let Region { columns, rows } = self.region;
         let mut sum = Vec3::ZERO;
-        for dy in [-2_isize, 0, 2] {
-            for dx in [-2_isize, 0, 2] {
-                let (at_x, at_y) = (x.wrapping_add_signed(dx), y.wrapping_add_signed(dy));
-                if !(columns.contains(&at_x) && rows.contains(&at_y)) {
-                    continue;
-                }
-                let depth_m = self.vertices.points[at_y * self.vertices.width + at_x].z;
-                let normal = self.rough[(at_y - rows.start) * columns.len() + at_x - columns.start];
-                if (depth_m - center.z).abs() < limit_m && normal.x.is_finite() {
-                    sum += normal;
+        for at_y in [y.wrapping_sub(REACH_PX), y, y + REACH_PX] {
+            if !rows.contains(&at_y) {
+                continue;
+            }
+            let depths = &self.vertices.points[at_y * width..];
+            let normals = &self.rough[(at_y - rows.start) * columns.len()..];
+            for at_x in [x.wrapping_sub(REACH_PX), x, x + REACH_PX] {
+                if columns.contains(&at_x) && (depths[at_x].z - center).abs() < limit_m {
+                    sum += normals[at_x - columns.start];
                 }
             }
         }

@@ -32,61 +32,76 @@ pub fn drop_flying_pixels(
     config: &FlyingPixelConfig,
     before: &mut Vec<f32>,
 ) {
-    let (width, height) = (depth.width, depth.height);
-    before.clone_from(&depth.metres);
-    let before = &*before;
+    if region.is_empty() {
+        return;
+    }
+    let width = depth.width;
+    let copied = copy_with_border(depth, region, before);
     let rows = region.rows.start * width..region.rows.end * width;
     depth.metres[rows]
         .par_chunks_mut(width)
         .enumerate()
-        .for_each(|(row, metres)| {
-            let y = region.rows.start + row;
-            for x in region.columns.clone() {
-                let center = metres[x];
-                if center.is_nan() {
-                    continue;
+        .for_each_init(
+            || (Vec::new(), Vec::new()),
+            |(limits_m, support), (row, metres)| {
+                let metres = &mut metres[region.columns.clone()];
+                limits_m.clear();
+                limits_m.extend(metres.iter().map(|&depth_m| {
+                    // NaN counts as 0 here; it supports nothing and is not supported.
+                    tolerance.step_m(depth_m, 1.0, config.slope, config.range_sigmas)
+                }));
+                count_support(&copied, row, limits_m, support);
+                for (depth_m, &support) in metres.iter_mut().zip(&*support) {
+                    if support < config.neighbours as f32 {
+                        *depth_m = f32::NAN;
+                    }
                 }
-                let limit_m = tolerance.step_m(center, 1.0, config.slope, config.range_sigmas);
-                let support = support(before, [width, height], [x, y], limit_m);
-                if support < config.neighbours {
-                    metres[x] = f32::NAN;
-                }
-            }
-        });
+            },
+        );
 }
 
-/// How many of the 8 neighbours are within the limit; those beyond the image's border count as if they were.
-#[inline]
-fn support(depths: &[f32], [width, height]: [usize; 2], [x, y]: [usize; 2], limit_m: f32) -> u32 {
-    let center = depths[y * width + x];
-    let supports = |index: usize| u32::from((depths[index] - center).abs() < limit_m);
-    if x > 0 && y > 0 && x + 1 < width && y + 1 < height {
-        let above = (y - 1) * width + x;
-        let here = y * width + x;
-        let below = (y + 1) * width + x;
-        return (supports(above - 1) + supports(above) + supports(above + 1))
-            + (supports(here - 1) + supports(here + 1))
-            + (supports(below - 1) + supports(below) + supports(below + 1));
+/// A region's depths with a border of one pixel; beyond the image the border repeats its edge.
+struct Copied<'a> {
+    metres: &'a [f32],
+    stride: usize,
+}
+
+fn copy_with_border<'a>(depth: &DepthMap, region: &Region, before: &'a mut Vec<f32>) -> Copied<'a> {
+    before.clear();
+    let stride = region.columns.len() + 2;
+    for y in region.rows.start..region.rows.end + 2 {
+        let row = y.saturating_sub(1).min(depth.height - 1) * depth.width;
+        before.push(depth.metres[row + region.columns.start.saturating_sub(1)]);
+        before.extend(&depth.metres[row..][region.columns.clone()]);
+        before.push(depth.metres[row + region.columns.end.min(depth.width - 1)]);
     }
-    let mut count = 0;
-    for (dx, dy) in [
-        (-1, -1),
-        (0, -1),
-        (1, -1),
-        (-1, 0),
-        (1, 0),
-        (-1, 1),
+    Copied { metres: before, stride }
+}
+
+/// How many of each pixel's 8 neighbours are within its limit, for one row.
+fn count_support(copied: &Copied<'_>, row: usize, limits_m: &[f32], support: &mut Vec<f32>) {
+    let count = limits_m.len();
+    support.clear();
+    support.resize(count, 0.0);
+    let line = |row: usize, shift: usize| &copied.metres[row * copied.stride + shift..][..count];
+    let center = line(row + 1, 1);
+    for (down, right) in [
+        (0, 0),
         (0, 1),
-        (1, 1),
+        (0, 2),
+        (1, 0),
+        (1, 2),
+        (2, 0),
+        (2, 1),
+        (2, 2),
     ] {
-        let (at_x, at_y) = (x.wrapping_add_signed(dx), y.wrapping_add_signed(dy));
-        count += if at_x < width && at_y < height {
-            supports(at_y * width + at_x)
-        } else {
-            1
-        };
+        let neighbours = line(row + down, right);
+        // Written so that the compiler can do several pixels at a time.
+        for index in 0..count {
+            let near = (neighbours[index] - center[index]).abs() < limits_m[index];
+            support[index] += f32::from(u8::from(near));
+        }
     }
-    count
 }
 
 #[cfg(test)]

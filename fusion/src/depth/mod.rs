@@ -4,4 +4,5 @@ pub mod bilateral;
 pub mod fill;
 pub mod flying_pixels;
 pub mod segment;
+pub(crate) mod sigma;
 pub mod tolerance;

@@ -78,6 +78,9 @@ impl Default for BodyConfig {
     }
 }
 
+/// More people than this shoulder to shoulder are not told apart.
+const MAX_CROWD: f32 = 3.0;
+
 /// A part of the scene that may be a person.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Body {
@@ -113,7 +116,7 @@ pub(super) fn find(
     tolerance: &Tolerance,
     config: &BodyConfig,
 ) -> Vec<Body> {
-    let mut moments = measure(coarse, labels, floor, tolerance);
+    let mut moments = measure(coarse, labels, floor, tolerance, config);
     let mut several = false;
     for (label, moments) in moments.iter().enumerate() {
         let crowded = moments.area_m2 > config.crowd_area_m2
@@ -121,7 +124,7 @@ pub(super) fn find(
         several |= crowded && split::split_people(coarse, labels, label as u32, floor);
     }
     if several {
-        moments = measure(coarse, labels, floor, tolerance);
+        moments = measure(coarse, labels, floor, tolerance, config);
     }
     moments
         .into_iter()
@@ -135,14 +138,22 @@ fn measure(
     labels: &Labels,
     floor: Option<FloorPlane>,
     tolerance: &Tolerance,
+    config: &BodyConfig,
 ) -> Vec<Moments> {
     let up = floor.unwrap_or(FloorPlane { normal: Vec3::NEG_Y, offset_m: 0.0 });
+    // Walls are most of an image, and need no more than their area.
+    let areas_m2 = areas(coarse, labels, tolerance);
+    let most_m2 = MAX_CROWD * config.area_m2[1];
+    let plausible: Vec<bool> = areas_m2
+        .iter()
+        .map(|area| (config.area_m2[0]..=most_m2).contains(area))
+        .collect();
     let mut moments = vec![Moments::default(); labels.sizes.len()];
     for y in 0..coarse.height {
         for x in 0..coarse.width {
             let cell = y * coarse.width + x;
             let label = labels.of_cell(cell);
-            if label == NO_LABEL {
+            if label == NO_LABEL || !plausible[label as usize] {
                 continue;
             }
             let rim = x < 2 || y < 2 || x + 2 >= coarse.width || y + 2 >= coarse.height;
@@ -154,6 +165,18 @@ fn measure(
         }
     }
     moments
+}
+
+fn areas(coarse: &Coarse, labels: &Labels, tolerance: &Tolerance) -> Vec<f32> {
+    let mut areas_m2 = vec![0.0; labels.sizes.len()];
+    for cell in 0..coarse.points.len() {
+        let label = labels.of_cell(cell);
+        if label != NO_LABEL {
+            let size_m = coarse.cell_size_m(cell, tolerance);
+            areas_m2[label as usize] += size_m * size_m;
+        }
+    }
+    areas_m2
 }
 
 impl Default for Moments {

@@ -1,12 +1,16 @@
 //! The depth image at half its size: enough to tell people from rooms, at a quarter of the cost.
 
 use glam::Vec3;
+use rayon::prelude::*;
 
 use super::super::tolerance::Tolerance;
 use crate::maps::{DepthMap, Rays};
 
 /// Pixels along a side of a cell.
 pub(super) const CELL_PX: usize = 2;
+
+/// Pixels closer than this are one surface for any sensor.
+const ALIKE_M: f32 = 0.002;
 
 /// One point for each cell; NaN where nothing was measured.
 #[derive(Clone, Debug)]
@@ -37,17 +41,21 @@ impl Coarse {
 
     /// Each cell takes the mean of its pixels near the nearest one: at an edge the front surface.
     pub(super) fn update(&mut self, depth: &DepthMap, tolerance: &Tolerance) {
-        for y in 0..self.height {
-            let above = &depth.metres[CELL_PX * y * depth.width..][..depth.width];
-            let below = &depth.metres[(CELL_PX * y + 1) * depth.width..][..depth.width];
-            let row = y * self.width..(y + 1) * self.width;
-            let cells = self.points[row.clone()].iter_mut().zip(&self.rays[row]);
-            for ((point, ray), (above, below)) in
-                cells.zip(above.chunks_exact(CELL_PX).zip(below.chunks_exact(CELL_PX)))
-            {
-                *point = *ray * front_depth([above[0], above[1], below[0], below[1]], tolerance);
-            }
-        }
+        let rows = self
+            .points
+            .par_chunks_mut(self.width.max(1))
+            .zip(self.rays.par_chunks(self.width.max(1)));
+        rows.enumerate()
+            .with_min_len(32)
+            .for_each(|(y, (points, rays))| {
+                let above = &depth.metres[CELL_PX * y * depth.width..][..depth.width];
+                let below = &depth.metres[(CELL_PX * y + 1) * depth.width..][..depth.width];
+                let pairs = above.chunks_exact(CELL_PX).zip(below.chunks_exact(CELL_PX));
+                for ((point, ray), (above, below)) in points.iter_mut().zip(rays).zip(pairs) {
+                    *point =
+                        *ray * front_depth([above[0], above[1], below[0], below[1]], tolerance);
+                }
+            });
     }
 
     /// The metres a cell is wide at its depth.
@@ -59,6 +67,13 @@ impl Coarse {
 #[inline]
 fn front_depth(pixels: [f32; 4], tolerance: &Tolerance) -> f32 {
     // `min` prefers a number to NaN.
+    let [a, b, c, d] = pixels;
+    let spread = a.max(b).max(c.max(d)) - a.min(b).min(c.min(d));
+    let mean = 0.25 * (a + b + c + d);
+    // Most cells are like this; NaN, of a missing pixel, is not.
+    if spread < ALIKE_M && !mean.is_nan() {
+        return mean;
+    }
     let nearest = pixels[0].min(pixels[1]).min(pixels[2].min(pixels[3]));
     if nearest.is_nan() {
         return f32::NAN;

@@ -38,6 +38,8 @@ impl Default for FloorConfig {
 
 /// Cells between samples, in both directions.
 const SAMPLE_STEP: usize = 4;
+/// Cells between a sample and what is looked at above it.
+const ABOVE: usize = 5;
 /// Cells between the points a sample's normal is taken from.
 const REACH: usize = 2;
 /// A floor seen from a metre above, 8 m away.
@@ -54,9 +56,16 @@ const UP: Vec3 = Vec3::NEG_Y;
 pub(super) struct FloorFinder {
     config: FloorConfig,
     last: Option<FloorPlane>,
-    /// All sampled points, and those whose surface is roughly level.
-    samples: Vec<Vec3>,
-    level: Vec<Vec3>,
+    samples: Vec<Sample>,
+    /// Samples whose surface is roughly level.
+    level: Vec<Sample>,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Sample {
+    point: Vec3,
+    /// What is seen a little higher in the image.
+    above: Vec3,
 }
 
 #[derive(Clone, Copy, Debug, Default)]
@@ -71,6 +80,19 @@ impl Support {
     }
 }
 
+impl Sample {
+    /// Whether the surface goes up from here instead of back: the foot of a wall, or a foot. They are as
+    /// near to the floor as its noise, but always above it, and would lift the plane.
+    fn rises(&self, plane: FloorPlane) -> bool {
+        // The sample's own noise must not decide: where the plane says it is, is compared.
+        let on_plane_m = |point: Vec3| plane.offset_m * point.z / plane.normal.dot(point);
+        let here_m = on_plane_m(self.point);
+        let expected_m = on_plane_m(self.above) - here_m;
+        // NaN, of nothing above, does not rise; a plane that ends at the horizon is not level ground either.
+        self.above.z - here_m < 0.5 * expected_m || expected_m < 0.0
+    }
+}
+
 impl FloorFinder {
     pub(super) fn new(config: FloorConfig) -> Self {
         Self { config, last: None, samples: Vec::new(), level: Vec::new() }
@@ -80,10 +102,10 @@ impl FloorFinder {
         self.take_samples(coarse, tolerance);
         self.last = self
             .last
-            .and_then(|plane| self.settle(plane, tolerance))
+            .and_then(|plane| self.settle(plane, 1, tolerance))
             .or_else(|| {
                 self.search(tolerance)
-                    .and_then(|plane| self.settle(plane, tolerance))
+                    .and_then(|plane| self.settle(plane, 1, tolerance))
             });
         self.last
     }
@@ -99,7 +121,11 @@ impl FloorFinder {
                 if point.z.is_nan() {
                     continue;
                 }
-                self.samples.push(point);
+                let above = cell
+                    .checked_sub(ABOVE * coarse.width)
+                    .map(|cell| coarse.points[cell]);
+                let sample = Sample { point, above: above.unwrap_or(Vec3::NAN) };
+                self.samples.push(sample);
                 let around = [cell - REACH, cell + REACH]
                     .into_iter()
                     .chain([cell - REACH * coarse.width, cell + REACH * coarse.width])
@@ -116,7 +142,7 @@ impl FloorFinder {
                     [0, 1, 2, 3].map(|index| around.clone().nth(index).unwrap_or(point));
                 let normal = (below - above).cross(right - left).normalize_or_zero();
                 if normal.dot(UP) > least_up {
-                    self.level.push(point);
+                    self.level.push(sample);
                 }
             }
         }
@@ -130,7 +156,7 @@ impl FloorFinder {
         let mut random = SplitMix::new(self.config.seed);
         let mut best: Option<(i64, FloorPlane)> = None;
         for _ in 0..self.config.hypotheses {
-            let [a, b, c] = [0; 3].map(|_| self.level[random.below(self.level.len())]);
+            let [a, b, c] = [0; 3].map(|_| self.level[random.below(self.level.len())].point);
             let Some(plane) = plane_through(a, b, c).filter(|plane| self.is_plausible(*plane))
             else {
                 continue;
@@ -144,8 +170,13 @@ impl FloorFinder {
     }
 
     /// Fits a plane to the samples around it; `None` if too few of them agree, or too many lie below.
-    fn settle(&self, mut plane: FloorPlane, tolerance: &Tolerance) -> Option<FloorPlane> {
-        for _ in 0..3 {
+    fn settle(
+        &self,
+        mut plane: FloorPlane,
+        rounds: usize,
+        tolerance: &Tolerance,
+    ) -> Option<FloorPlane> {
+        for _ in 0..rounds {
             plane = self
                 .fit_around(plane, tolerance)
                 .filter(|plane| self.is_plausible(*plane))?;
@@ -163,9 +194,9 @@ impl FloorFinder {
             && (lowest..=highest).contains(&-plane.offset_m)
     }
 
-    fn support(&self, plane: FloorPlane, points: &[Vec3], tolerance: &Tolerance) -> Support {
+    fn support(&self, plane: FloorPlane, samples: &[Sample], tolerance: &Tolerance) -> Support {
         let mut support = Support::default();
-        for &point in points {
+        for &Sample { point, .. } in samples {
             let height_m = plane.height_m(point);
             let near_m = self.near_m(point, plane, tolerance);
             support.inliers += usize::from(height_m.abs() < near_m);
@@ -179,37 +210,40 @@ impl FloorFinder {
         self.config.unevenness_m + 2.5 * noise_across_m(point, plane, tolerance)
     }
 
-    /// Least squares of y = a x + b z + c over the samples near a plane, each by its noise.
+    /// Least squares over the samples near a plane, each by its noise.
+    ///
+    /// A plane `n . p = o` seen along rays `p = z r` is `1 / z = (n / o) . r`: linear, and with all of the
+    /// sensor's noise on the left. Fitting heights instead would tilt the plane, as depth is noisy too.
     fn fit_around(&self, plane: FloorPlane, tolerance: &Tolerance) -> Option<FloorPlane> {
         let (mut lhs, mut rhs) = (DMat3::ZERO, DVec3::ZERO);
         let (mut weights, mut sum, mut squares) = (0.0, DVec3::ZERO, DVec3::ZERO);
-        for &point in &self.samples {
+        for sample in &self.samples {
+            let point = sample.point;
             let near_m = self.near_m(point, plane, tolerance);
-            if plane.height_m(point).abs() >= near_m {
+            if plane.height_m(point).abs() >= near_m || sample.rises(plane) {
                 continue;
             }
-            let weight = f64::from(1.0 / (near_m * near_m));
             let point = point.as_dvec3();
-            let row = DVec3::new(point.x, point.z, 1.0);
-            lhs += DMat3::from_cols(row * row.x, row * row.y, row * row.z) * weight;
-            rhs += row * point.y * weight;
-            weights += weight;
-            sum += point * weight;
-            squares += point * point * weight;
+            let ray = point / point.z;
+            // A difference in inverse depth is a height divided by depth and by the plane's offset.
+            let weight = (point.z / f64::from(near_m)).powi(2);
+            lhs += DMat3::from_cols(ray * ray.x, ray * ray.y, ray * ray.z) * weight;
+            rhs += ray * (weight / point.z);
+            weights += 1.0;
+            sum += point;
+            squares += point * point;
         }
-        let spread = (squares / weights - (sum / weights).powf(2.0))
-            .max(DVec3::ZERO)
-            .powf(0.5);
+        let variance = squares / weights - (sum / weights) * (sum / weights);
+        let least = f64::from(MIN_SPREAD_M * MIN_SPREAD_M);
         // NaN, of no samples, fails too.
-        let wide = spread.x > f64::from(MIN_SPREAD_M) && spread.z > f64::from(MIN_SPREAD_M);
+        let wide = variance.x > least && variance.z > least;
         if !wide {
             return None;
         }
-        let [a, b, c] = (lhs.inverse() * rhs).to_array();
-        let normal = DVec3::new(a, -1.0, b);
-        let length = normal.length();
-        let plane =
-            FloorPlane { normal: (normal / length).as_vec3(), offset_m: (-c / length) as f32 };
+        let scaled = lhs.inverse() * rhs;
+        // The camera is above the floor, so the offset along the normal up is negative.
+        let offset = -scaled.length().recip();
+        let plane = FloorPlane { normal: (scaled * offset).as_vec3(), offset_m: offset as f32 };
         (plane.normal.is_finite() && plane.offset_m.is_finite()).then_some(plane)
     }
 }

@@ -88,10 +88,8 @@ impl Labels {
         let width = coarse.width;
         let cell = y * width + x;
         let depth_m = coarse.points[cell].z;
-        let limit_m = |cells: usize| {
-            tolerance.step_m(depth_m, (cells * CELL_PX) as f32, MAX_SLOPE, STEP_SIGMAS)
-        };
-        let near_m = limit_m(1);
+        let near_m = tolerance.step_m(depth_m, CELL_PX as f32, MAX_SLOPE, STEP_SIGMAS);
+        let mut joined_above = false;
         for (available, step) in [(x, 1), (y, width)] {
             for distance in 1..=BRIDGE.min(available) {
                 let other = cell - distance * step;
@@ -101,9 +99,13 @@ impl Labels {
                 // Across a hole no more slope is allowed for than next door: it may hide a step.
                 if (coarse.points[other].z - depth_m).abs() < near_m {
                     self.sets.join(cell as u32, other as u32);
+                    joined_above = step == width;
                 }
                 break;
             }
+        }
+        if joined_above {
+            return;
         }
         let diagonals = [(x > 0, width + 1), (x + 1 < width, width - 1)];
         for (_, back) in diagonals.into_iter().filter(|&(inside, _)| y > 0 && inside) {
