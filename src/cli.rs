@@ -1,0 +1,220 @@
+//! What can be typed.
+
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use effigy_registration::motion::Routine;
+use effigy_sim_sensor::{MotionChoice, OutfitKind, SensorPreset};
+use serde::de::{DeserializeOwned, IntoDeserializer as _, value};
+
+/// One depth camera in, a live avatar out.
+#[derive(Debug, Parser)]
+#[command(
+    name = "effigy",
+    version,
+    about = "Turns one depth camera into a live, animatable avatar of the person in front of it",
+    after_help = "Without a command, the demo runs: a simulated person becomes an avatar.\n\n\
+                  Example: effigy demo --headless --out out"
+)]
+pub(crate) struct Cli {
+    #[command(subcommand)]
+    pub(crate) command: Option<Command>,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    /// A simulated person in front of a simulated sensor becomes an avatar
+    #[command(after_help = "Example: effigy demo --headless --out out")]
+    Demo(Box<DemoArgs>),
+    /// Record a simulated sensor, with the truth beside it
+    #[command(
+        after_help = "Example: effigy simulate --out s.mcap --sensor d435 --motion walk-in-place --seed 7"
+    )]
+    Simulate(SimulateArgs),
+    /// Run the whole chain on a recording or a folder of images
+    #[command(
+        after_help = "Example: effigy replay s.mcap --headless --out out --poses out/poses.json"
+    )]
+    Replay(ReplayArgs),
+    /// Turn other people's recordings into ours
+    #[command(after_help = "Example: effigy import tum rgbd_dataset_freiburg1_xyz --out s.mcap")]
+    Import(ImportArgs),
+    /// Say what a recording, a folder, an avatar or a body file holds
+    #[command(after_help = "Example: effigy info s.mcap")]
+    Info(InfoArgs),
+    /// Play a motion on an avatar and write it for Blender, three.js and others
+    #[command(after_help = "Example: effigy export avatar.effigy --motion walk.bvh --glb out.glb")]
+    Export(ExportArgs),
+    /// Make the prior that ships with the program
+    #[command(
+        after_help = "Example: effigy train prior --out avatar/assets/prior_live.safetensors"
+    )]
+    Train(TrainArgs),
+}
+
+impl Default for Command {
+    fn default() -> Self {
+        Self::Demo(Box::new(DemoArgs::parse_from(["effigy"])))
+    }
+}
+
+#[derive(Debug, Parser)]
+pub(crate) struct DemoArgs {
+    #[command(flatten)]
+    pub(crate) scene: SceneArgs,
+    #[command(flatten)]
+    pub(crate) chain: ChainArgs,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct SceneArgs {
+    /// The simulated sensor: azure, d435, oak, kinect
+    #[arg(long, default_value = "azure", value_parser = named::<SensorPreset>)]
+    pub(crate) sensor: SensorPreset,
+    /// What the person does: mixture, turn-around, walk-in-place, raise-arms, squat, wave, stand, or a .bvh file
+    #[arg(long, default_value = "mixture", value_parser = motion)]
+    pub(crate) motion: MotionChoice,
+    /// What the person wears: demo, close-fitting, loose, sport, random, bare
+    #[arg(long, default_value = "demo", value_parser = named::<OutfitKind>)]
+    pub(crate) outfit: OutfitKind,
+    /// Who the person is, and what the sensor gets wrong
+    #[arg(long, default_value_t = 1)]
+    pub(crate) seed: u64,
+    /// How long it goes on
+    #[arg(long, default_value_t = 20.0)]
+    pub(crate) seconds: f32,
+}
+
+/// A name as in files, with dashes or underscores.
+fn named<T: DeserializeOwned>(text: &str) -> Result<T, value::Error> {
+    T::deserialize(text.replace('-', "_").into_deserializer())
+}
+
+fn motion(text: &str) -> Result<MotionChoice, value::Error> {
+    let is_file = text.to_ascii_lowercase().ends_with(".bvh");
+    if is_file {
+        return Ok(MotionChoice::Bvh(PathBuf::from(text)));
+    }
+    named::<Routine>(text).map(MotionChoice::Routine)
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct SimulateArgs {
+    /// The recording to write
+    #[arg(long)]
+    pub(crate) out: PathBuf,
+    #[command(flatten)]
+    pub(crate) scene: SceneArgs,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct ReplayArgs {
+    /// A recording (.mcap), a TUM-style folder, a point cloud (.pcd) or one depth image (.png)
+    pub(crate) input: PathBuf,
+    #[command(flatten)]
+    pub(crate) chain: ChainArgs,
+    /// Deliver frames when the sensor did, and drop what comes too late
+    #[arg(long)]
+    pub(crate) realtime: bool,
+}
+
+/// What the demo and a replay share.
+#[derive(Debug, Args)]
+pub(crate) struct ChainArgs {
+    /// No window: write pictures, the avatar and a report
+    #[arg(long)]
+    pub(crate) headless: bool,
+    /// Where pictures, avatar and report go
+    #[arg(long, default_value = "out")]
+    pub(crate) out: PathBuf,
+    /// How many keyframes the avatar is made of
+    #[arg(long, default_value_t = 8)]
+    pub(crate) keyframes: usize,
+    /// Write each frame's body in depth-camera space as JSON
+    #[arg(long, value_name = "FILE")]
+    pub(crate) poses: Option<PathBuf>,
+    /// Write each frame's posed avatar in depth-camera space as PLY
+    #[arg(long, value_name = "DIR")]
+    pub(crate) meshes: Option<PathBuf>,
+    /// Write the report here as well
+    #[arg(long, value_name = "FILE")]
+    pub(crate) json: Option<PathBuf>,
+    /// A body model in SMPL's layout (.npz) instead of the built-in one
+    #[arg(long, value_name = "FILE")]
+    pub(crate) body: Option<PathBuf>,
+    /// Settings of the stages (TOML); what it does not name keeps its default
+    #[arg(long, value_name = "FILE")]
+    pub(crate) config: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct ImportArgs {
+    /// What the input is
+    pub(crate) kind: ImportKind,
+    /// The folder or file to read
+    pub(crate) input: PathBuf,
+    /// The recording to write
+    #[arg(long)]
+    pub(crate) out: PathBuf,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(crate) enum ImportKind {
+    /// A TUM RGB-D style folder
+    Tum,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct InfoArgs {
+    /// Any file or folder Effigy reads
+    pub(crate) input: PathBuf,
+    /// Write what is printed as JSON too
+    #[arg(long, value_name = "FILE")]
+    pub(crate) json: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct ExportArgs {
+    /// The avatar file
+    pub(crate) avatar: PathBuf,
+    /// A BVH file to play
+    #[arg(long)]
+    pub(crate) motion: Option<PathBuf>,
+    /// The binary glTF file to write
+    #[arg(long)]
+    pub(crate) glb: PathBuf,
+    /// The body model the avatar was made with, if it was not the built-in one
+    #[arg(long, value_name = "FILE")]
+    pub(crate) body: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct TrainArgs {
+    #[command(subcommand)]
+    pub(crate) what: TrainWhat,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum TrainWhat {
+    /// Meta-learn the field and the hypernetwork over simulated people
+    Prior(TrainPriorArgs),
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct TrainPriorArgs {
+    /// The file to write; a checkpoint beside it lets the run resume
+    #[arg(long)]
+    pub(crate) out: PathBuf,
+    /// Which people, poses and points
+    #[arg(long, default_value_t = 1)]
+    pub(crate) seed: u64,
+    /// How many simulated people to learn from
+    #[arg(long, default_value_t = 24)]
+    pub(crate) people: usize,
+    /// How many poses of each
+    #[arg(long, default_value_t = 24)]
+    pub(crate) poses: usize,
+    /// Go on from the checkpoint beside the output
+    #[arg(long)]
+    pub(crate) resume: bool,
+}

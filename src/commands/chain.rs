@@ -1,0 +1,144 @@
+//! What the demo and a replay share: source in, avatar and report out.
+
+use std::{path::Path, sync::Arc};
+
+use effigy_capture::FrameSource;
+use effigy_registration::{BodyModel, smpl::builtin};
+use effigy_sim_sensor::Truth;
+
+use crate::{
+    cli::ChainArgs,
+    machine::{Machine, peak_memory_mb},
+    pipeline::{
+        avatar_stage::{AvatarStage, Swap},
+        clock::{Clock, percentile},
+        evaluate::evaluate,
+        lock_step,
+        outputs::Outputs,
+        real_time,
+        run_log::RunLog,
+        settings::Settings,
+    },
+    report::{FineTuneFigures, FrameCounts, Latency, Report, SCHEMA},
+};
+
+pub(crate) struct Input {
+    pub(crate) source: Box<dyn FrameSource>,
+    pub(crate) truth: Option<Truth>,
+    pub(crate) pace: Pace,
+}
+
+/// Who sets the pace.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Pace {
+    /// The slowest stage: no frame is dropped.
+    LockStep,
+    /// The source's clock: what comes too late is dropped and counted.
+    RealTime,
+}
+
+pub(crate) fn run(mut input: Input, args: &ChainArgs) -> anyhow::Result<()> {
+    let clock = Clock::start();
+    let body = body_model(args.body.as_deref())?;
+    let mut settings = Settings::load(args.config.as_deref())?;
+    settings.keyframes.count = args.keyframes;
+    let name = input.source.name();
+    let calibration = input.source.calibration().clone();
+    let mut outputs = Outputs::new(args, &calibration, input.source.frame_count(), &body)?;
+    let swap = match input.pace {
+        Pace::LockStep => Swap::AfterFrames(settings.schedule.swap_after_frames),
+        Pace::RealTime => Swap::WhenReady,
+    };
+    let mut avatar = AvatarStage::new(Arc::clone(&body), &settings, swap, clock);
+    let log = match input.pace {
+        Pace::LockStep => lock_step::run(
+            &mut *input.source,
+            &body,
+            &settings,
+            (&mut avatar, &mut outputs),
+            clock,
+        )?,
+        Pace::RealTime => real_time::run(
+            input.source,
+            &body,
+            &settings,
+            (&mut avatar, &mut outputs),
+            clock,
+        )?,
+    };
+    let mut report = report(name, &log);
+    outputs.finish(&log, avatar.avatar(), input.truth.as_ref())?;
+    evaluate(
+        &mut report,
+        &log,
+        &body,
+        avatar.avatar(),
+        input.truth.as_ref(),
+    )?;
+    report.seconds_total = clock.secs();
+    report.peak_memory_mb = peak_memory_mb();
+    report.write(&args.out.join("report.json"))?;
+    if let Some(path) = &args.json {
+        report.write(path)?;
+    }
+    println!("{report}\nwritten to {}", args.out.display());
+    Ok(())
+}
+
+/// The built-in body, or a file's.
+pub(crate) fn body_model(path: Option<&Path>) -> anyhow::Result<Arc<BodyModel>> {
+    match path {
+        Some(path) => Ok(Arc::new(BodyModel::load(path)?)),
+        None => Ok(builtin::body()),
+    }
+}
+
+fn report(source: String, log: &RunLog) -> Report {
+    Report {
+        schema: SCHEMA,
+        source,
+        machine: Machine::this(),
+        seconds_total: 0.0,
+        peak_memory_mb: None,
+        frames: FrameCounts {
+            delivered: log.delivered,
+            tracked: log.tracked.len() as u64,
+            dropped: log.dropped.clone(),
+        },
+        time_to_first_track_secs: log.time_to_first_track_secs(),
+        tracked_fraction: log.tracked_fraction(),
+        keyframes: log.keyframes.len(),
+        fine_tune: log.job.map(|job| FineTuneFigures {
+            steps: job.steps,
+            seconds: job.fine_tune_secs,
+            loss: job.loss,
+            held_out_mm: job.held_out_mm,
+        }),
+        time_to_first_avatar_secs: log.job.map(|job| job.total_secs),
+        latency_ms: latency(log),
+        stages_ms: log.timings.summary(),
+        body: None,
+        avatar: None,
+        avatar_tracked: None,
+        bare_body: None,
+        bare_body_tracked: None,
+        truth: None,
+    }
+}
+
+/// `None` where nobody's clock set the pace.
+fn latency(log: &RunLog) -> Option<Latency> {
+    let of = |wanted: bool| -> Vec<f32> {
+        let picked = log
+            .latencies_ms
+            .iter()
+            .filter(|(_, tuning)| *tuning == wanted);
+        picked.map(|(milliseconds, _)| *milliseconds).collect()
+    };
+    let (alone, tuning) = (of(false), of(true));
+    Some(Latency {
+        p50: percentile(&alone, 0.5)?,
+        p95: percentile(&alone, 0.95)?,
+        p95_while_fine_tuning: percentile(&tuning, 0.95),
+    })
+}

@@ -1,0 +1,31 @@
+//! `effigy export`: an avatar and a motion, for other programs.
+
+use effigy_avatar::export::{GlbOptions, write_glb};
+use effigy_registration::motion::{Motion, RestBody};
+
+use super::chain::body_model;
+use crate::{avatar_file, cli::ExportArgs};
+
+pub(crate) fn run(args: &ExportArgs) -> anyhow::Result<()> {
+    let body = body_model(args.body.as_deref())?;
+    let avatar = avatar_file::read(&args.avatar, &body.identity)?;
+    let motion = match &args.motion {
+        Some(path) => Some(Motion::from_bvh(
+            path,
+            &RestBody::of(&body, &avatar.subject.betas),
+        )?),
+        None => None,
+    };
+    write_glb(
+        &args.glb,
+        &avatar,
+        &GlbOptions { motion: motion.as_ref(), ..GlbOptions::default() },
+    )?;
+    let played = motion.map_or(0.0, |motion| motion.duration_secs());
+    println!(
+        "{}: {} vertices, {played:.1} s of motion",
+        args.glb.display(),
+        avatar.topology.vertices_in_unit.len()
+    );
+    Ok(())
+}

@@ -1,0 +1,48 @@
+//! `effigy info`: what a file holds.
+
+use std::{fs, path::Path};
+
+use anyhow::{Context as _, bail};
+use effigy_avatar::checkpoint;
+use effigy_capture::{recording, source};
+use serde_json::{Value, json};
+
+use crate::cli::InfoArgs;
+
+pub(crate) fn run(args: &InfoArgs) -> anyhow::Result<()> {
+    let facts = facts(&args.input)?;
+    let text = serde_json::to_string_pretty(&facts).context("facts are plain data")?;
+    println!("{text}");
+    if let Some(path) = &args.json {
+        fs::write(path, text + "\n")
+            .with_context(|| format!("{}: cannot write; is the folder there?", path.display()))?;
+    }
+    Ok(())
+}
+
+fn facts(path: &Path) -> anyhow::Result<Value> {
+    let ending = path
+        .extension()
+        .and_then(|ending| ending.to_str())
+        .unwrap_or_default();
+    match ending {
+        "mcap" => Ok(serde_json::to_value(recording::info(path)?)?),
+        "effigy" => avatar_facts(path),
+        _ if path.exists() => source_facts(path),
+        _ => bail!("{}: no such file or folder", path.display()),
+    }
+}
+
+fn avatar_facts(path: &Path) -> anyhow::Result<Value> {
+    let header = checkpoint::read_header(path)?;
+    Ok(serde_json::to_value(header)?)
+}
+
+fn source_facts(path: &Path) -> anyhow::Result<Value> {
+    let source = source::open(path)?;
+    Ok(json!({
+        "kind": source.name(),
+        "frames": source.frame_count(),
+        "calibration": source.calibration(),
+    }))
+}

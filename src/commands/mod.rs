@@ -1,0 +1,11 @@
+//! One file a command.
+
+pub(crate) mod chain;
+pub(crate) mod demo;
+pub(crate) mod export;
+pub(crate) mod import;
+pub(crate) mod info;
+pub(crate) mod replay;
+pub(crate) mod scene;
+pub(crate) mod simulate;
+pub(crate) mod train;

@@ -1,0 +1,196 @@
+//! Fine-tuning in the background: from keyframes to an avatar, on its own low-priority threads.
+
+use std::{
+    ops::ControlFlow,
+    sync::{
+        Arc, Mutex, PoisonError,
+        atomic::{AtomicBool, Ordering},
+    },
+    thread,
+};
+
+use anyhow::{Context as _, anyhow, ensure};
+use crossbeam::channel::{Receiver, TryRecvError, bounded};
+use effigy_avatar::{
+    Avatar, CanonicalSamples, Canonicaliser, TopologyConfig,
+    fine_tune::{FineTuneProgress, fine_tune},
+    hyper,
+    keyframes::Keyframe,
+    nn::Threads,
+};
+use effigy_registration::BodyModel;
+
+use super::{clock::Clock, settings::Settings};
+
+/// A running job; dropping it cancels it.
+pub(crate) struct AvatarJob {
+    cancel: Arc<AtomicBool>,
+    progress: Arc<Mutex<FineTuneProgress>>,
+    result: Receiver<anyhow::Result<FinishedAvatar>>,
+}
+
+pub(crate) struct FinishedAvatar {
+    pub(crate) avatar: Avatar,
+    pub(crate) figures: JobFigures,
+}
+
+/// What making an avatar took and came to.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct JobFigures {
+    pub(crate) steps: usize,
+    pub(crate) loss: f32,
+    pub(crate) held_out_mm: f32,
+    pub(crate) fine_tune_secs: f64,
+    /// From the keyframes to an avatar that can be driven.
+    pub(crate) total_secs: f64,
+}
+
+impl AvatarJob {
+    pub(crate) fn start(
+        keyframes: Vec<Keyframe>,
+        body: &Arc<BodyModel>,
+        settings: &Settings,
+        clock: Clock,
+    ) -> anyhow::Result<Self> {
+        let cancel = Arc::new(AtomicBool::new(false));
+        let progress = Arc::new(Mutex::new(FineTuneProgress::default()));
+        let (sender, result) = bounded(1);
+        let work = Work {
+            keyframes,
+            body: Arc::clone(body),
+            settings: settings.clone(),
+            cancel: Arc::clone(&cancel),
+            progress: Arc::clone(&progress),
+            clock,
+        };
+        thread::Builder::new()
+            .name("fine-tune".to_owned())
+            .spawn(move || {
+                lower_priority();
+                // Nobody listens any more after a cancellation.
+                drop(sender.send(work.run()));
+            })
+            .context("cannot start the fine-tuning thread")?;
+        Ok(Self { cancel, progress, result })
+    }
+
+    /// The result, once there is one; never waits.
+    pub(crate) fn poll(&self) -> Option<anyhow::Result<FinishedAvatar>> {
+        match self.result.try_recv() {
+            Ok(finished) => Some(finished),
+            Err(TryRecvError::Empty) => None,
+            Err(TryRecvError::Disconnected) => Some(Err(died())),
+        }
+    }
+
+    pub(crate) fn wait(&self) -> anyhow::Result<FinishedAvatar> {
+        self.result.recv().unwrap_or_else(|_| Err(died()))
+    }
+
+    pub(crate) fn progress(&self) -> FineTuneProgress {
+        *self.progress.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Drop for AvatarJob {
+    fn drop(&mut self) {
+        self.cancel.store(true, Ordering::Relaxed);
+    }
+}
+
+fn died() -> anyhow::Error {
+    anyhow!("fine-tuning ended without a result; this is a defect of Effigy, please report it")
+}
+
+/// The live chain goes first; the threads that this one starts inherit its place.
+fn lower_priority() {
+    #[cfg(target_os = "linux")]
+    {
+        const NICE: i32 = 15;
+        let thread = rustix::thread::gettid();
+        if let Err(error) = rustix::process::setpriority_process(Some(thread), NICE) {
+            tracing::warn!(%error, "fine-tuning keeps the priority of everything else");
+        }
+    }
+}
+
+struct Work {
+    keyframes: Vec<Keyframe>,
+    body: Arc<BodyModel>,
+    settings: Settings,
+    cancel: Arc<AtomicBool>,
+    progress: Arc<Mutex<FineTuneProgress>>,
+    clock: Clock,
+}
+
+impl Work {
+    fn run(self) -> anyhow::Result<FinishedAvatar> {
+        let started = self.clock.secs();
+        let newest = self
+            .keyframes
+            .iter()
+            .max_by_key(|keyframe| keyframe.frame.id());
+        let betas = newest
+            .context("an avatar needs at least one keyframe")?
+            .params
+            .betas;
+        let canonicaliser = Canonicaliser::new(
+            Arc::clone(&self.body),
+            &betas,
+            self.settings.canonicalise.clone(),
+        )?;
+        let samples: Vec<CanonicalSamples> = self
+            .keyframes
+            .iter()
+            .filter_map(|keyframe| Some(canonicaliser.process(&keyframe.frame)?.0))
+            .collect();
+        let prior = hyper::prior();
+        ensure!(
+            prior.provenance.body == Some(self.body.identity),
+            "the shipped prior was made for another body; make one with `effigy train prior`"
+        );
+        let metres_per_unit = canonicaliser.subject().unit_box.metres_per_unit();
+        let tuning_started = self.clock.secs();
+        let mut last = FineTuneProgress::default();
+        let config = &self.settings.fine_tune;
+        let network = Threads::new(&config.threads, lower_priority)?.run(|| {
+            fine_tune(
+                prior,
+                &samples,
+                metres_per_unit,
+                config,
+                &|| self.clock.secs(),
+                &mut |now| {
+                    last = *now;
+                    self.report(now)
+                },
+            )
+        })?;
+        let fine_tune_secs = self.clock.secs() - tuning_started;
+        let middle = &samples[samples.len() / 2];
+        let avatar = Avatar::new(
+            canonicaliser.subject(),
+            Arc::new(network),
+            &**canonicaliser.skinning(),
+            &middle.theta,
+            &TopologyConfig::default(),
+        )?;
+        let figures = JobFigures {
+            steps: last.step as usize,
+            loss: last.loss.total() as f32,
+            held_out_mm: last.held_out_residual_m * 1e3,
+            fine_tune_secs,
+            total_secs: self.clock.secs() - started,
+        };
+        Ok(FinishedAvatar { avatar, figures })
+    }
+
+    fn report(&self, now: &FineTuneProgress) -> ControlFlow<()> {
+        *self.progress.lock().unwrap_or_else(PoisonError::into_inner) = *now;
+        if self.cancel.load(Ordering::Relaxed) {
+            ControlFlow::Break(())
+        } else {
+            ControlFlow::Continue(())
+        }
+    }
+}

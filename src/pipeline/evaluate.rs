@@ -1,0 +1,275 @@
+//! What the avatar is worth: against observed depth always, against the truth where a simulator left it.
+
+use std::sync::Arc;
+
+use anyhow::Context as _;
+use effigy_avatar::{
+    Avatar, DriveConfig, Driver, mesher, metrics,
+    skinning::{ClosestBodyPoint, Skinning as _, Warp},
+};
+use effigy_capture::Rigid3;
+use effigy_fusion::{TriangleMesh, mesh::normals::vertex_normals};
+use effigy_registration::{BodyModel, BodyParams};
+use effigy_sim_sensor::{GroundTruth, Truth};
+use glam::Vec3;
+
+use super::{
+    poses::transformed,
+    run_log::{RunLog, TrackedSample},
+};
+use crate::report::{BodyScores, Report, SurfaceScores};
+
+/// Frames, evenly spread, whose observed points are compared with posed surfaces.
+const OBSERVED_FRAMES: usize = 60;
+
+/// Frames, evenly spread, whose true surface is compared with surfaces extracted in full.
+const TRUTH_FRAMES: usize = 10;
+
+/// MetaAvatar's grid: its D_p means nothing at another density.
+const RESOLUTION: usize = 256;
+
+/// Fills in the report's scores.
+pub(crate) fn evaluate(
+    report: &mut Report,
+    log: &RunLog,
+    body: &Arc<BodyModel>,
+    avatar: Option<&Arc<Avatar>>,
+    truth: Option<&Truth>,
+) -> anyhow::Result<()> {
+    let unseen: Vec<&TrackedSample> = log.unseen().collect();
+    let observed = evenly(&unseen, OBSERVED_FRAMES);
+    let mut bare = SurfaceScores::default();
+    bare.observed_mm = mean_observed(&observed, |sample| {
+        Ok(mesh(body.pose(&sample.params).vertices, &body.triangles))
+    })?;
+    if let Some(truth) = truth {
+        report.body = body_scores(log, body, truth)?;
+        report.truth = Some(SurfaceScores {
+            observed_mm: mean_observed(&observed, |sample| true_surface_in_world(truth, sample))?,
+            ..SurfaceScores::default()
+        });
+        let compared = evenly(&unseen, TRUTH_FRAMES);
+        let bare_mesh = |params: &BodyParams| Ok(mesh(body.pose(params).vertices, &body.triangles));
+        let judge = Judge { body, truth };
+        bare = judge
+            .scores(&compared, Poses::True, &bare_mesh)?
+            .with_observed(bare.observed_mm);
+        let tracked = judge.scores(&compared, Poses::Tracked, &bare_mesh)?;
+        report.bare_body_tracked = Some(tracked.with_observed(bare.observed_mm));
+        if let Some(avatar) = avatar {
+            let surface = FullSurface::new(avatar, body);
+            let avatar_mesh = |params: &BodyParams| Ok(surface.posed(params));
+            report.avatar = Some(judge.scores(&compared, Poses::True, &avatar_mesh)?);
+            report.avatar_tracked = Some(judge.scores(&compared, Poses::Tracked, &avatar_mesh)?);
+        }
+    }
+    if let Some(avatar) = avatar {
+        let mut driver = Driver::new(Arc::clone(avatar), DriveConfig::default());
+        let seen = mean_observed(&observed, |sample| {
+            Ok(driver.pose(&sample.params, sample.id).to_mesh())
+        })?;
+        report.avatar = Some(report.avatar.unwrap_or_default().with_observed(seen));
+        report.avatar_tracked = report
+            .avatar_tracked
+            .map(|scores| scores.with_observed(seen));
+    }
+    report.bare_body = Some(bare);
+    Ok(())
+}
+
+impl SurfaceScores {
+    fn with_observed(self, observed_mm: Option<f64>) -> Self {
+        Self { observed_mm, ..self }
+    }
+}
+
+/// Whose poses a surface is put into before it is compared.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Poses {
+    True,
+    Tracked,
+}
+
+/// Compares surfaces with the true one, in the depth camera's space.
+struct Judge<'a> {
+    body: &'a BodyModel,
+    truth: &'a Truth,
+}
+
+impl Judge<'_> {
+    fn scores(
+        &self,
+        samples: &[&TrackedSample],
+        poses: Poses,
+        surface_in_own_space: &dyn Fn(&BodyParams) -> anyhow::Result<TriangleMesh>,
+    ) -> anyhow::Result<SurfaceScores> {
+        let measured = metrics::measured_vertices(self.body);
+        let mut sums = [0.0_f64; 4];
+        let mut count = 0;
+        for sample in samples {
+            let true_frame = self.truth.at(sample.id);
+            let camera_from_sim = true_frame.world_from_camera.inverse();
+            let params = self.params_in_camera(sample, &true_frame, poses);
+            let truth = moved(&true_frame.clothed_in_world, camera_from_sim);
+            let predicted = surface_in_own_space(&params)?;
+            let Some(scores) = metrics::surface_metrics(&truth, &measured, &predicted)? else {
+                continue;
+            };
+            let p2s_mm = metrics::p2s_mm(&truth, &predicted)?;
+            for (sum, value) in
+                sums.iter_mut()
+                    .zip([scores.d_p_cm, scores.d_f_cm, scores.nc, p2s_mm])
+            {
+                *sum += f64::from(value);
+            }
+            count += 1;
+        }
+        let mean = |sum: f64| (count > 0).then(|| sum / f64::from(count));
+        Ok(SurfaceScores {
+            observed_mm: None,
+            d_p_cm: mean(sums[0]),
+            d_f_cm: mean(sums[1]),
+            nc: mean(sums[2]),
+            p2s_mm: mean(sums[3]),
+        })
+    }
+
+    /// The pose in camera space, with the fitted shape: two shapes' pelvises are laid on each other.
+    fn params_in_camera(
+        &self,
+        sample: &TrackedSample,
+        true_frame: &GroundTruth,
+        poses: Poses,
+    ) -> BodyParams {
+        let pelvis = |betas| self.body.joints(&self.body.shaped_vertices(betas))[0];
+        let fitted_pelvis = pelvis(&sample.params.betas);
+        match poses {
+            Poses::Tracked => transformed(
+                &sample.params,
+                sample.world_from_camera.inverse(),
+                fitted_pelvis,
+            ),
+            Poses::True => {
+                let true_pelvis = pelvis(&true_frame.params.betas);
+                let camera_from_sim = true_frame.world_from_camera.inverse();
+                let mut params = transformed(&true_frame.params, camera_from_sim, true_pelvis);
+                params.trans += true_pelvis - fitted_pelvis;
+                BodyParams { betas: sample.params.betas, ..params }
+            }
+        }
+    }
+}
+
+/// The avatar extracted at full resolution for each pose.
+struct FullSurface<'a> {
+    avatar: &'a Avatar,
+    skinning: ClosestBodyPoint,
+}
+
+impl<'a> FullSurface<'a> {
+    fn new(avatar: &'a Avatar, body: &Arc<BodyModel>) -> Self {
+        let config = Default::default();
+        let skinning = ClosestBodyPoint::new(Arc::clone(body), &avatar.subject.betas, config);
+        Self { avatar, skinning }
+    }
+
+    fn posed(&self, params: &BodyParams) -> TriangleMesh {
+        let subject = &self.avatar.subject;
+        let sdf = self.avatar.field.field(&subject.pose_input(&params.theta));
+        let in_unit = mesher::extract(&*sdf, RESOLUTION);
+        let in_canonical: Vec<Vec3> = in_unit
+            .vertices
+            .iter()
+            .map(|&vertex| subject.unit_box.canonical_from_unit(vertex))
+            .collect();
+        let warp = Warp::new(params, &subject.rest_joints);
+        let posed = self
+            .skinning
+            .forward(&in_canonical, &in_unit.normals)
+            .iter()
+            .zip(&in_canonical)
+            .map(|(skinned, &point)| {
+                warp.posed_from_canonical(&skinned.weights)
+                    .transform_point3(point)
+            })
+            .collect();
+        mesh(posed, &in_unit.triangles)
+    }
+}
+
+/// Joints and vertices of the tracked body against the true one, over all tracked frames.
+fn body_scores(
+    log: &RunLog,
+    body: &BodyModel,
+    truth: &Truth,
+) -> anyhow::Result<Option<BodyScores>> {
+    let mut sums = [0.0_f64; 2];
+    for sample in &log.tracked {
+        let true_frame = truth.at(sample.id);
+        let tracked = body.pose(&sample.params);
+        let to_camera = |b_from_a: Rigid3, points: &[Vec3]| -> Vec<Vec3> {
+            points.iter().map(|&point| b_from_a * point).collect()
+        };
+        let from_tracked = sample.world_from_camera.inverse();
+        let from_true = true_frame.world_from_camera.inverse();
+        let minimal = &true_frame.minimal;
+        sums[0] += f64::from(metrics::v2v_mm(
+            &to_camera(from_true, &minimal.joints),
+            &to_camera(from_tracked, &tracked.joints),
+        ));
+        sums[1] += f64::from(metrics::v2v_mm(
+            &to_camera(from_true, &minimal.vertices),
+            &to_camera(from_tracked, &tracked.vertices),
+        ));
+    }
+    let count = log.tracked.len() as f64;
+    Ok((count > 0.0).then(|| BodyScores { mpjpe_mm: sums[0] / count, v2v_mm: sums[1] / count }))
+}
+
+/// Mean over frames of the mean distance from observed points to a surface in the sample's world.
+fn mean_observed(
+    samples: &[&TrackedSample],
+    mut surface: impl FnMut(&TrackedSample) -> anyhow::Result<TriangleMesh>,
+) -> anyhow::Result<Option<f64>> {
+    let mut sum = 0.0;
+    for sample in samples {
+        let points: Vec<Vec3> = sample
+            .points_in_camera
+            .iter()
+            .map(|&point| sample.world_from_camera * point)
+            .collect();
+        let distance_mm = metrics::observed_mm(&points, &surface(sample)?)
+            .with_context(|| format!("frame {}", sample.id.0))?;
+        sum += f64::from(distance_mm);
+    }
+    Ok((!samples.is_empty()).then(|| sum / samples.len() as f64))
+}
+
+/// The true surface in the world that tracking found for itself.
+fn true_surface_in_world(truth: &Truth, sample: &TrackedSample) -> anyhow::Result<TriangleMesh> {
+    let true_frame = truth.at(sample.id);
+    let world_from_sim = sample.world_from_camera * true_frame.world_from_camera.inverse();
+    Ok(moved(&true_frame.clothed_in_world, world_from_sim))
+}
+
+fn moved(mesh_in_a: &TriangleMesh, b_from_a: Rigid3) -> TriangleMesh {
+    let vertices = mesh_in_a
+        .vertices
+        .iter()
+        .map(|&vertex| b_from_a * vertex)
+        .collect();
+    mesh(vertices, &mesh_in_a.triangles)
+}
+
+fn mesh(vertices: Vec<Vec3>, triangles: &[[u32; 3]]) -> TriangleMesh {
+    let normals = vertex_normals(&vertices, triangles);
+    TriangleMesh { vertices, normals, triangles: triangles.to_vec(), colors: Vec::new() }
+}
+
+/// At most `count` items, evenly spread.
+fn evenly<T: Copy>(items: &[T], count: usize) -> Vec<T> {
+    let taken = count.min(items.len());
+    (0..taken)
+        .map(|index| items[(2 * index + 1) * items.len() / (2 * taken)])
+        .collect()
+}

@@ -1,0 +1,39 @@
+//! One frame after another, nothing dropped: what replays, headless demos and tests run.
+
+use std::sync::Arc;
+
+use effigy_capture::FrameSource;
+use effigy_registration::BodyModel;
+
+use super::{
+    avatar_stage::AvatarStage, clock::Clock, outputs::Outputs, run_log::RunLog, settings::Settings,
+    track_stage::TrackStage,
+};
+use crate::interrupt;
+
+/// Takes a source to its end (or to Ctrl-C); the same source gives the same result, bit for bit.
+pub(crate) fn run(
+    source: &mut dyn FrameSource,
+    body: &Arc<BodyModel>,
+    settings: &Settings,
+    (avatar, outputs): (&mut AvatarStage, &mut Outputs),
+    clock: Clock,
+) -> anyhow::Result<RunLog> {
+    let mut tracking = TrackStage::new(source.calibration(), Arc::clone(body), settings, clock);
+    let mut log = RunLog::new(clock);
+    while !interrupt::requested() {
+        let Some(frame) = log.timings.time(&clock, "source", || source.next_frame())? else {
+            break;
+        };
+        log.delivered(&frame);
+        let registered = tracking.process(&frame)?;
+        log.registered(&registered);
+        avatar.advance(&registered)?;
+        let mesh = avatar.drive(&registered);
+        outputs.frame(&frame, &registered, mesh.as_ref(), avatar)?;
+    }
+    avatar.finish()?;
+    log.timings.merge(tracking.timings);
+    log.avatar_made(avatar);
+    Ok(log)
+}

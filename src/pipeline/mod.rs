@@ -1,0 +1,14 @@
+//! The stages put together: the only threads, the only clock, and who waits for whom.
+
+pub(crate) mod avatar_job;
+pub(crate) mod avatar_stage;
+pub(crate) mod clock;
+pub(crate) mod evaluate;
+pub(crate) mod lock_step;
+pub(crate) mod outputs;
+pub(crate) mod pictures;
+pub(crate) mod poses;
+pub(crate) mod real_time;
+pub(crate) mod run_log;
+pub(crate) mod settings;
+pub(crate) mod track_stage;

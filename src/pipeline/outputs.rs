@@ -1,0 +1,137 @@
+//! What a run writes while it runs and when it ends.
+
+use std::{fs, path::PathBuf, sync::Arc};
+
+use anyhow::Context as _;
+use effigy_avatar::{
+    Avatar, AvatarMesh, checkpoint,
+    export::{GlbOptions, write_glb, write_ply},
+};
+use effigy_capture::{Calibration, Frame};
+use effigy_registration::{
+    BodyModel, RegisteredFrame,
+    motion::{Motion, MotionPose},
+};
+use effigy_sim_sensor::Truth;
+use effigy_viewer::pictures;
+
+use super::{
+    avatar_stage::AvatarStage,
+    pictures::{first_picture, save_sheet},
+    poses::PoseLog,
+    run_log::{RunLog, TrackedSample},
+};
+use crate::{cli::ChainArgs, progress::Progress};
+
+/// How many moments a contact sheet shows.
+const MOMENTS: u64 = 8;
+
+/// Every so many frames, where nobody knows how many there will be.
+const MOMENT_EVERY: u64 = 90;
+
+pub(crate) struct Outputs {
+    out: PathBuf,
+    poses: Option<(PathBuf, PoseLog)>,
+    meshes: Option<PathBuf>,
+    calibration: Calibration,
+    body: Arc<BodyModel>,
+    moment_every: u64,
+    moments: Vec<RegisteredFrame>,
+    first_picture_done: bool,
+    progress: Progress,
+}
+
+impl Outputs {
+    /// Makes the folders, so that an unwritable place is known at once.
+    pub(crate) fn new(
+        args: &ChainArgs,
+        calibration: &Calibration,
+        frame_count: Option<u64>,
+        body: &Arc<BodyModel>,
+    ) -> anyhow::Result<Self> {
+        for folder in std::iter::once(&args.out).chain(&args.meshes) {
+            fs::create_dir_all(folder).with_context(|| {
+                format!(
+                    "{}: cannot make this folder; choose another",
+                    folder.display()
+                )
+            })?;
+        }
+        Ok(Self {
+            out: args.out.clone(),
+            poses: args.poses.clone().map(|path| (path, PoseLog::default())),
+            meshes: args.meshes.clone(),
+            calibration: calibration.clone(),
+            body: Arc::clone(body),
+            moment_every: frame_count.map_or(MOMENT_EVERY, |count| (count / MOMENTS).max(1)),
+            moments: Vec::new(),
+            first_picture_done: false,
+            progress: Progress::new("frames", frame_count),
+        })
+    }
+
+    pub(crate) fn frame(
+        &mut self,
+        frame: &Frame,
+        registered: &RegisteredFrame,
+        mesh: Option<&AvatarMesh>,
+        avatar: &AvatarStage,
+    ) -> anyhow::Result<()> {
+        if let Some((_, poses)) = &mut self.poses {
+            poses.add(registered, &self.body);
+        }
+        if let (Some(folder), Some(mesh)) = (&self.meshes, mesh) {
+            let path = folder.join(format!("frame_{:06}.ply", frame.id.0));
+            write_ply(&path, mesh, registered.world_from_camera.inverse())?;
+        }
+        let sensor = &self.calibration.depth.intrinsics;
+        if !self.first_picture_done {
+            let picture = first_picture(registered, sensor, &self.body);
+            pictures::save(&picture, &self.out.join("first.png"))?;
+            self.first_picture_done = true;
+        }
+        let due = frame.id.0 % self.moment_every == self.moment_every / 2;
+        if due && registered.params().is_some() {
+            self.moments.push(registered.clone());
+        }
+        self.progress.say(avatar.status());
+        self.progress.advance(frame.id.0 + 1);
+        Ok(())
+    }
+
+    /// Pictures, avatar file and GLB; the report is written by the command, last.
+    pub(crate) fn finish(
+        &self,
+        log: &RunLog,
+        avatar: Option<&Arc<Avatar>>,
+        truth: Option<&Truth>,
+    ) -> anyhow::Result<()> {
+        self.progress.finish();
+        if let Some((path, poses)) = &self.poses {
+            poses.write(path)?;
+        }
+        let sheet = self.out.join("sheet.png");
+        let sensor = &self.calibration.depth.intrinsics;
+        save_sheet(&sheet, &self.moments, (sensor, &self.body), avatar, truth)?;
+        if let Some(avatar) = avatar {
+            checkpoint::write(&self.out.join("avatar.effigy"), avatar)?;
+            let motion = self.tracked_motion(log);
+            let options = GlbOptions { motion: Some(&motion), ..GlbOptions::default() };
+            write_glb(&self.out.join("avatar.glb"), avatar, &options)?;
+        }
+        Ok(())
+    }
+
+    /// What the person did, as the avatar shall do it in other programs.
+    fn tracked_motion(&self, log: &RunLog) -> Motion {
+        let pose = |sample: &TrackedSample| MotionPose {
+            theta: sample.params.theta,
+            trans: sample.params.trans,
+        };
+        Motion {
+            name: "tracked".to_owned(),
+            rate_hz: self.calibration.rate_hz,
+            poses: log.tracked.iter().map(pose).collect(),
+        }
+    }
+}

@@ -1,0 +1,167 @@
+//! `report.json`: what a run measured. Keys are explained in `docs/report.md`.
+
+use std::{collections::BTreeMap, fmt, fs, path::Path};
+
+use anyhow::Context as _;
+use serde::Serialize;
+
+use crate::machine::Machine;
+
+/// Changes when a key changes its meaning.
+pub(crate) const SCHEMA: &str = "effigy.report/1";
+
+#[derive(Clone, Debug, Serialize)]
+pub(crate) struct Report {
+    pub(crate) schema: &'static str,
+    pub(crate) source: String,
+    pub(crate) machine: Machine,
+    pub(crate) seconds_total: f64,
+    pub(crate) peak_memory_mb: Option<f64>,
+    pub(crate) frames: FrameCounts,
+    pub(crate) time_to_first_track_secs: Option<f64>,
+    pub(crate) tracked_fraction: Option<f64>,
+    pub(crate) keyframes: usize,
+    pub(crate) fine_tune: Option<FineTuneFigures>,
+    pub(crate) time_to_first_avatar_secs: Option<f64>,
+    pub(crate) latency_ms: Option<Latency>,
+    pub(crate) stages_ms: BTreeMap<String, StageTime>,
+    pub(crate) body: Option<BodyScores>,
+    pub(crate) avatar: Option<SurfaceScores>,
+    pub(crate) avatar_tracked: Option<SurfaceScores>,
+    pub(crate) bare_body: Option<SurfaceScores>,
+    pub(crate) bare_body_tracked: Option<SurfaceScores>,
+    pub(crate) truth: Option<SurfaceScores>,
+}
+
+#[derive(Clone, Debug, Default, Serialize)]
+pub(crate) struct FrameCounts {
+    #[serde(rename = "in")]
+    pub(crate) delivered: u64,
+    pub(crate) tracked: u64,
+    /// By cause.
+    pub(crate) dropped: BTreeMap<String, u64>,
+}
+
+#[derive(Clone, Copy, Debug, Serialize)]
+pub(crate) struct FineTuneFigures {
+    pub(crate) steps: usize,
+    pub(crate) seconds: f64,
+    pub(crate) loss: f32,
+    pub(crate) held_out_mm: f32,
+}
+
+/// From a frame's delivery to its posed body (and avatar, once there is one).
+#[derive(Clone, Copy, Debug, Serialize)]
+pub(crate) struct Latency {
+    pub(crate) p50: f64,
+    pub(crate) p95: f64,
+    pub(crate) p95_while_fine_tuning: Option<f64>,
+}
+
+#[derive(Clone, Copy, Debug, Serialize)]
+pub(crate) struct StageTime {
+    pub(crate) mean: f64,
+    pub(crate) p50: f64,
+    pub(crate) p95: f64,
+}
+
+/// The tracked body against the true one.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub(crate) struct BodyScores {
+    pub(crate) mpjpe_mm: f64,
+    pub(crate) v2v_mm: f64,
+}
+
+/// A surface against the true one; definitions: `effigy_avatar::metrics`.
+#[derive(Clone, Copy, Debug, Default, Serialize)]
+pub(crate) struct SurfaceScores {
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) observed_mm: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) d_p_cm: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) d_f_cm: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) nc: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) p2s_mm: Option<f64>,
+}
+
+impl Report {
+    pub(crate) fn write(&self, path: &Path) -> anyhow::Result<()> {
+        let text = serde_json::to_string_pretty(self).context("a report is plain numbers")?;
+        fs::write(path, text + "\n").with_context(|| {
+            format!(
+                "{}: cannot write the report; is the folder there and writable?",
+                path.display()
+            )
+        })
+    }
+}
+
+/// The lines that a person wants to see at the end.
+impl fmt::Display for Report {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let counts = &self.frames;
+        writeln!(
+            f,
+            "frames      {} in, {} tracked",
+            counts.delivered, counts.tracked
+        )?;
+        for (cause, count) in &counts.dropped {
+            writeln!(f, "            {count} dropped: {cause}")?;
+        }
+        for (stage, time) in &self.stages_ms {
+            writeln!(
+                f,
+                "{stage:<11} {:.1} ms p50, {:.1} ms p95",
+                time.p50, time.p95
+            )?;
+        }
+        if let Some(tune) = &self.fine_tune {
+            writeln!(
+                f,
+                "fine-tuning {} steps in {:.1} s, {:.1} mm held out",
+                tune.steps, tune.seconds, tune.held_out_mm
+            )?;
+        }
+        if let Some(body) = &self.body {
+            writeln!(
+                f,
+                "body        MPJPE {:.1} mm, V2V {:.1} mm",
+                body.mpjpe_mm, body.v2v_mm
+            )?;
+        }
+        for (name, scores) in [
+            ("avatar", self.avatar),
+            ("  tracked", self.avatar_tracked),
+            ("bare body", self.bare_body),
+            ("  tracked", self.bare_body_tracked),
+            ("truth", self.truth),
+        ] {
+            if let Some(scores) = scores {
+                writeln!(f, "{name:<11} {scores}")?;
+            }
+        }
+        write!(f, "in all      {:.1} s", self.seconds_total)
+    }
+}
+
+impl fmt::Display for SurfaceScores {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let figures = [
+            ("observed", self.observed_mm, "mm"),
+            ("D_p", self.d_p_cm, "cm"),
+            ("D_f", self.d_f_cm, "cm"),
+            ("NC", self.nc, ""),
+            ("P2S", self.p2s_mm, "mm"),
+        ];
+        let known = figures
+            .iter()
+            .filter_map(|(name, value, unit)| Some((name, (*value)?, unit)));
+        for (name, value, unit) in known {
+            write!(f, "{name} {value:.3} {unit}  ")?;
+        }
+        Ok(())
+    }
+}
