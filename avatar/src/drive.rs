@@ -8,7 +8,12 @@ use effigy_registration::{BodyParams, smpl::JOINT_COUNT};
 use glam::{Affine3A, Vec3};
 use serde::{Deserialize, Serialize};
 
-use crate::{mesher::FieldAt, model::Avatar, sdf::SignedDistanceField, skinning::Warp};
+use crate::{
+    mesher::{self, FieldAt},
+    model::Avatar,
+    sdf::SignedDistanceField,
+    skinning::{Skinning, Warp},
+};
 
 /// How vertices find the zero level of a new pose.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -59,6 +64,31 @@ impl AvatarMesh {
             colors: Vec::new(),
         }
     }
+}
+
+/// The avatar in one pose as a mesh of its own, extracted with `resolution` points a side: for export and for
+/// measuring (MetaAvatar: 256). Slow; the [`Driver`] is for live use.
+pub fn extract_posed(
+    avatar: &Avatar,
+    skinning: &dyn Skinning,
+    params: &BodyParams,
+    resolution: usize,
+) -> TriangleMesh {
+    let subject = &avatar.subject;
+    let sdf = avatar.field.field(&subject.pose_input(&params.theta));
+    let mut mesh = mesher::extract(&*sdf, resolution);
+    for vertex in &mut mesh.vertices {
+        *vertex = subject.unit_box.canonical_from_unit(*vertex);
+    }
+    let warp = Warp::new(params, &subject.rest_joints);
+    let skinned = skinning.forward(&mesh.vertices, &mesh.normals);
+    for (vertex, point) in mesh.vertices.iter_mut().zip(&skinned) {
+        *vertex = warp
+            .posed_from_canonical(&point.weights)
+            .transform_point3(*vertex);
+    }
+    mesh.compute_normals();
+    mesh
 }
 
 /// Poses one avatar, frame by frame; no frame depends on the one before.
@@ -179,6 +209,7 @@ mod tests {
     use super::*;
     use crate::{
         export::write_ply,
+        skinning::{ClosestBodyPoint, ClosestBodyPointConfig},
         testing::{Suit, everyday_poses, suit_avatar},
     };
 
@@ -245,6 +276,25 @@ mod tests {
             // jumps, keep a little of it.
             assert!(mean < 0.8);
         }
+    }
+
+    #[test]
+    fn a_full_extraction_and_the_driven_mesh_are_one_surface() {
+        let avatar = Arc::new(suit_avatar(0.01));
+        let suit = Suit::new(0.01);
+        let skinning = ClosestBodyPoint::new(
+            Arc::clone(&suit.model),
+            &suit.subject.betas,
+            ClosestBodyPointConfig::default(),
+        );
+        let params = everyday_poses()[1];
+        let full = extract_posed(&avatar, &skinning, &params, 160);
+        assert!(full.is_watertight());
+        let driven = Driver::new(avatar, DriveConfig::default()).pose(&params, FrameId(0));
+        let distances = distances_mm(&driven.vertices, &full);
+        let mean = distances.iter().sum::<f32>() / distances.len() as f32;
+        println!("mean {mean:.2} mm");
+        assert!(mean < 0.6);
     }
 
     #[test]

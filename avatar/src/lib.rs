@@ -26,7 +26,7 @@ pub mod skinning;
 mod testing;
 
 pub use canonicalise::{CanonicaliseConfig, Canonicaliser};
-pub use drive::{AvatarMesh, DriveConfig, Driver};
+pub use drive::{AvatarMesh, DriveConfig, Driver, extract_posed};
 pub use error::AvatarError;
 pub use keyframes::{KeyframeConfig, KeyframeSelector};
 pub use model::{Avatar, PoseField, Subject, TopologyConfig};
