@@ -391,6 +391,27 @@ mod tests {
     }
 
     #[test]
+    fn an_avatar_with_the_shipped_prior_survives_its_file() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.effigy");
+        let saved = Avatar { field: Arc::new(crate::hyper::prior()), ..avatar() };
+        saved.save(&path).unwrap();
+        let loaded = Avatar::load(&path, BodyIdentity([7; 16])).unwrap();
+        let pose = saved.subject.pose_input(&saved.topology_theta);
+        let points = [Vec3::ZERO, Vec3::splat(0.3), Vec3::new(-0.2, 0.7, 0.1)];
+        let values = |avatar: &Avatar| {
+            let mut values = [0.0; 3];
+            avatar.field.field(&pose).values(&points, &mut values);
+            values
+        };
+        assert_eq!(values(&loaded), values(&saved));
+        let other = Avatar { field: Arc::new(Sphere(0.5)), ..avatar() };
+        other.save(&path).unwrap();
+        let error = Avatar::load(&path, BodyIdentity([7; 16])).err().unwrap();
+        assert!(matches!(error, AvatarError::UnknownField { .. }), "{error}");
+    }
+
+    #[test]
     fn foreign_files_newer_formats_and_other_bodies_are_told_apart() {
         let bytes = to_bytes(&avatar()).unwrap();
         assert!(matches!(

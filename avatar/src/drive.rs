@@ -19,7 +19,8 @@ use crate::{
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Projection {
-    /// Along each vertex's own canonical normal; a step costs one field value.
+    /// Along each vertex's own canonical normal; a step costs one field value for each vertex that the step
+    /// before moved far.
     AlongNormals { steps: usize },
     /// Newton steps along the field's gradient; a step costs twice that, and triangles may drift.
     AlongGradients { steps: usize },
@@ -29,13 +30,19 @@ pub enum Projection {
 #[serde(default, deny_unknown_fields)]
 pub struct DriveConfig {
     pub projection: Projection,
+    /// A vertex that a step along its normal moved by less takes no further one: what is left is a tenth.
+    pub settled_m: f32,
     /// No vertex leaves its place in the topology by more: clothes on a body move by centimetres.
     pub max_offset_m: f32,
 }
 
 impl Default for DriveConfig {
     fn default() -> Self {
-        Self { projection: Projection::AlongNormals { steps: 2 }, max_offset_m: 0.05 }
+        Self {
+            projection: Projection::AlongNormals { steps: 3 },
+            settled_m: 0.003,
+            max_offset_m: 0.05,
+        }
     }
 }
 
@@ -100,7 +107,11 @@ pub struct Driver {
     /// How fast the field grows along each topology normal.
     slopes: Vec<f32>,
     offsets: Vec<f32>,
+    /// The vertices in unit space, on the way to the zero level.
     points: Vec<Vec3>,
+    /// Vertices that another step would move, and their places.
+    open: Vec<u32>,
+    queries: Vec<Vec3>,
     field_at: FieldAt,
 }
 
@@ -125,6 +136,8 @@ impl Driver {
             slopes,
             offsets: vec![0.0; count],
             points: Vec::with_capacity(count),
+            open: Vec::with_capacity(count),
+            queries: Vec::with_capacity(count),
             field_at,
             avatar,
             config,
@@ -173,17 +186,28 @@ impl Driver {
 
     fn project_along_normals(&mut self, sdf: &dyn SignedDistanceField, steps: usize, longest: f32) {
         let topology = &self.avatar.topology;
+        let metres_per_unit = self.avatar.subject.unit_box.metres_per_unit();
+        let settled = self.config.settled_m / metres_per_unit;
         self.offsets.fill(0.0);
+        self.open.clear();
+        self.open.extend(0..self.points.len() as u32);
         for _ in 0..steps {
-            let values = self.field_at.values(sdf, &self.points);
-            for (vertex, &value) in values.iter().enumerate() {
-                if value.is_finite() {
-                    let offset = self.offsets[vertex] - value / self.slopes[vertex];
-                    self.offsets[vertex] = offset.clamp(-longest, longest);
+            self.queries.clear();
+            self.queries
+                .extend(self.open.iter().map(|&vertex| self.points[vertex as usize]));
+            let mut values = self.field_at.values(sdf, &self.queries).iter();
+            self.open.retain(|&vertex| {
+                let vertex = vertex as usize;
+                let value = *values.next().expect("one value a query");
+                if !value.is_finite() {
+                    return false;
                 }
+                let step = value / self.slopes[vertex];
+                self.offsets[vertex] = (self.offsets[vertex] - step).clamp(-longest, longest);
                 self.points[vertex] = topology.vertices_in_unit[vertex]
                     + topology.normals[vertex] * self.offsets[vertex];
-            }
+                step.abs() > settled
+            });
         }
     }
 

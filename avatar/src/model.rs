@@ -1,6 +1,6 @@
 //! One person's avatar: the minimal body, the pose-conditioned field, and a mesh of fixed topology.
 
-use std::{any::Any, sync::Arc};
+use std::{any::Any, path::Path, sync::Arc};
 
 use effigy_fusion::TriangleMesh;
 use effigy_registration::{
@@ -11,7 +11,9 @@ use glam::{Affine3A, Vec3};
 use serde::{Deserialize, Serialize};
 
 use crate::{
+    checkpoint,
     error::AvatarError,
+    hyper::decode_field,
     mesher,
     neighbors::Neighbors,
     pose_input::PoseInput,
@@ -108,6 +110,16 @@ impl Avatar {
         let sdf = field.field(&subject.pose_input(theta));
         let topology = Topology::extract(&*sdf, subject, skinning, config)?;
         Ok(Self { subject: *subject, field, topology_theta: *theta, topology })
+    }
+
+    /// Writes the avatar file.
+    pub fn save(&self, path: &Path) -> Result<(), AvatarError> {
+        checkpoint::write(path, self)
+    }
+
+    /// Reads an avatar whose field is a hypernetwork and which was made with this body.
+    pub fn load(path: &Path, body: BodyIdentity) -> Result<Self, AvatarError> {
+        checkpoint::read(path, body, &decode_field)
     }
 
     /// For each topology vertex, rest (zero pose) from canonical space.

@@ -2,25 +2,24 @@
 //! space around it, moved to star pose and unit space.
 
 mod free_space;
+mod unpose;
 
 use std::sync::Arc;
 
 use effigy_capture::CameraModel;
 use effigy_fusion::{CleanFrame, maps::Rays};
-use effigy_registration::{BodyModel, BodyParams, PosedBody, RegisteredFrame};
+use effigy_registration::{BodyModel, BodyParams, RegisteredFrame};
 use glam::Vec3;
 use rand::{RngExt as _, SeedableRng as _, rngs::StdRng};
-use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::{
     error::AvatarError,
     model::Subject,
     samples::CanonicalSamples,
-    skinning::{
-        ClosestBodyPoint, ClosestBodyPointConfig, SkinnedPoint, Skinning, Warp, transform_normal,
-    },
+    skinning::{ClosestBodyPoint, ClosestBodyPointConfig, Skinning, Warp},
 };
+use unpose::Unposer;
 
 /// Which points are taken from a frame, and which of them are believed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -98,15 +97,6 @@ struct Observed {
     weights: Vec<f32>,
 }
 
-/// A posed point's canonical place.
-struct Returned {
-    canonical: Vec3,
-    normal: Vec3,
-    distance_to_body_m: f32,
-    /// How far the canonical point lands from the posed one when posed again.
-    miss_m: f32,
-}
-
 impl Canonicaliser {
     /// With skinning by the closest body point.
     pub fn new(
@@ -155,12 +145,18 @@ impl Canonicaliser {
 
         let seen = self.observed(frame);
         let mut counts = CanonicaliseCounts { observed: seen.points.len(), ..Default::default() };
-        // Twice as many as wanted are skinned, since some will be dropped.
-        let seen = seen.pick(2 * self.config.points, &mut rng);
-        let (points_in_unit, normals, weights) = self.surface(&seen, &posed, &warp, &mut counts);
+        // A quarter more than wanted, since some will be dropped.
+        let seen = seen.pick(self.config.points * 5 / 4, &mut rng);
+        let unposer = Unposer {
+            skinning: &*self.skinning,
+            posed: &posed,
+            warp: &warp,
+            refine_steps: self.config.refine_steps,
+        };
+        let (points_in_unit, normals, weights) = self.surface(&seen, &unposer, &mut counts);
 
         let free = free_space::points_in_world(frame, self.rays.as_ref(), &self.config, &mut rng);
-        let free_in_unit = self.free(&free, &posed, &warp);
+        let free_in_unit = self.free(&free, &unposer);
         counts.free = free_in_unit.len();
         let samples = CanonicalSamples {
             theta: params.theta,
@@ -173,7 +169,7 @@ impl Canonicaliser {
         Some((samples, counts))
     }
 
-    /// The person's pixels as world points.
+    /// The person's pixels that have a say, as world points.
     fn observed(&self, frame: &RegisteredFrame) -> Observed {
         let clean: &CleanFrame = &frame.clean;
         let mut observed = Observed::default();
@@ -185,13 +181,14 @@ impl Canonicaliser {
             let normal = Some(clean.normals.normals[pixel])
                 .filter(|normal| normal.is_finite())
                 .unwrap_or(Vec3::ZERO);
-            observed.points.push(frame.world_from_camera * point);
-            observed
-                .normals
-                .push(frame.world_from_camera.rotate(normal));
-            observed
-                .weights
-                .push(self.weight(point, normal, clean.sigma_m[pixel]));
+            let weight = self.weight(point, normal, clean.sigma_m[pixel]);
+            if weight > 0.0 {
+                observed.points.push(frame.world_from_camera * point);
+                observed
+                    .normals
+                    .push(frame.world_from_camera.rotate(normal));
+                observed.weights.push(weight);
+            }
         }
         observed
     }
@@ -223,15 +220,15 @@ impl Canonicaliser {
     fn surface(
         &self,
         seen: &Observed,
-        posed: &PosedBody,
-        warp: &Warp,
+        unposer: &Unposer<'_>,
         counts: &mut CanonicaliseCounts,
     ) -> (Vec<Vec3>, Vec<Vec3>, Vec<f32>) {
-        let returned = self.canonicalise(&seen.points, &seen.normals, posed, warp);
+        let limit_m = self.config.max_distance_to_body_m;
+        let returned = unposer.unpose(&seen.points, &seen.normals, limit_m);
         let (mut points, mut normals, mut weights) = (Vec::new(), Vec::new(), Vec::new());
         for (point, &weight) in returned.iter().zip(&seen.weights) {
             let in_unit = self.subject.unit_box.unit_from_canonical(point.canonical);
-            if point.distance_to_body_m > self.config.max_distance_to_body_m {
+            if point.distance_to_body_m > limit_m {
                 counts.far_from_body += 1;
             } else if point.miss_m.is_nan() || point.miss_m > self.config.max_return_m {
                 counts.not_returned += 1;
@@ -248,61 +245,17 @@ impl Canonicaliser {
     }
 
     /// Unit-space places of empty points near the body.
-    fn free(&self, points: &[Vec3], posed: &PosedBody, warp: &Warp) -> Vec<Vec3> {
+    fn free(&self, points: &[Vec3], unposer: &Unposer<'_>) -> Vec<Vec3> {
         /// Empty points must return well: a wrong one would carve the body.
         const MAX_MISS_M: f32 = 0.005;
-        self.canonicalise(points, &[], posed, warp)
+        let limit_m = self.config.max_free_distance_to_body_m;
+        unposer
+            .unpose(points, &[], limit_m)
             .iter()
-            .filter(|point| {
-                point.distance_to_body_m <= self.config.max_free_distance_to_body_m
-                    && point.miss_m <= MAX_MISS_M
-            })
+            .filter(|point| point.distance_to_body_m <= limit_m && point.miss_m <= MAX_MISS_M)
             .map(|point| self.subject.unit_box.unit_from_canonical(point.canonical))
             .filter(|&point| in_unit_box(point))
             .take(self.config.free_points)
-            .collect()
-    }
-
-    /// Inverse skinning, then rounds of forward skinning: `x_star = W(w(x_star))^-1 x_posed`.
-    fn canonicalise(
-        &self,
-        points: &[Vec3],
-        normals: &[Vec3],
-        posed: &PosedBody,
-        warp: &Warp,
-    ) -> Vec<Returned> {
-        let mut skinned = self.skinning.inverse(posed, points, normals);
-        let distances: Vec<f32> = skinned
-            .iter()
-            .map(|point| point.distance_to_body_m)
-            .collect();
-        let mut placed = place(points, normals, &skinned, warp);
-        for round in 0..=self.config.refine_steps {
-            let (canonical, canonical_normals): (Vec<Vec3>, Vec<Vec3>) =
-                placed.iter().copied().unzip();
-            let normals_known = if normals.is_empty() {
-                &[]
-            } else {
-                &canonical_normals[..]
-            };
-            skinned = self.skinning.forward(&canonical, normals_known);
-            if round < self.config.refine_steps {
-                placed = place(points, normals, &skinned, warp);
-            }
-        }
-        (0..points.len())
-            .map(|index| {
-                let (canonical, normal) = placed[index];
-                let back = warp
-                    .posed_from_canonical(&skinned[index].weights)
-                    .transform_point3(canonical);
-                Returned {
-                    canonical,
-                    normal,
-                    distance_to_body_m: distances[index].max(skinned[index].distance_to_body_m),
-                    miss_m: back.distance(points[index]),
-                }
-            })
             .collect()
     }
 }
@@ -323,30 +276,6 @@ impl Observed {
         self.weights.truncate(count);
         self
     }
-}
-
-/// Canonical points and normals, by these weights.
-fn place(
-    points: &[Vec3],
-    normals: &[Vec3],
-    skinned: &[SkinnedPoint],
-    warp: &Warp,
-) -> Vec<(Vec3, Vec3)> {
-    points
-        .par_iter()
-        .enumerate()
-        .with_min_len(256)
-        .map(|(index, &point)| {
-            let weights = &skinned[index].weights;
-            let normal = normals.get(index).map_or(Vec3::ZERO, |&normal| {
-                transform_normal(&warp.posed_from_canonical(weights).matrix3, normal)
-            });
-            (
-                warp.canonical_from_posed(weights).transform_point3(point),
-                normal,
-            )
-        })
-        .collect()
 }
 
 fn in_unit_box(point: Vec3) -> bool {

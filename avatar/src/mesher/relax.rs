@@ -54,9 +54,11 @@ impl FieldAt {
         Self { values: vec![0.0; count], gradients: vec![Vec3::ZERO; count] }
     }
 
+    /// The values at no more points than there are vertices.
     pub(crate) fn values(&mut self, sdf: &dyn SignedDistanceField, points: &[Vec3]) -> &[f32] {
-        sdf.values(points, &mut self.values);
-        &self.values
+        let values = &mut self.values[..points.len()];
+        sdf.values(points, values);
+        values
     }
 
     pub(crate) fn gradients(&mut self, sdf: &dyn SignedDistanceField, points: &[Vec3]) -> &[Vec3] {
