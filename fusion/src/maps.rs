@@ -150,7 +150,7 @@ impl NormalMap {
             return map;
         }
         let columns = region.columns.len();
-        rough.clear();
+        // What is left in it from before is overwritten.
         rough.resize(columns * region.rows.len(), Vec3::ZERO);
         rough
             .par_chunks_mut(columns)

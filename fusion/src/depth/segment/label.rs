@@ -25,6 +25,9 @@ const MIN_CELLS: u32 = 12;
 /// Everything closer to the floor than this belongs to it, beside the noise.
 const FLOOR_SKIN_M: f32 = 0.02;
 
+/// Nothing this high above the floor is the floor.
+const HIGH_M: f32 = 0.4;
+
 /// The part each cell belongs to.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Labels {
@@ -37,7 +40,9 @@ pub(super) struct Labels {
 /// Whether a point is the floor, as far as the sensor can tell.
 #[inline]
 pub(super) fn is_floor(point: Vec3, floor: FloorPlane, tolerance: &Tolerance) -> bool {
-    floor.height_m(point) < FLOOR_SKIN_M + 3.0 * noise_across_m(point, floor, tolerance)
+    let height_m = floor.height_m(point);
+    // Most points are far above any sensor's noise, and need no look at it.
+    height_m < HIGH_M && height_m < FLOOR_SKIN_M + 3.0 * noise_across_m(point, floor, tolerance)
 }
 
 impl Labels {
