@@ -1,10 +1,13 @@
 //! The avatar's geometry against simulated, clothed, noisy people: what is lost before any learning.
 
-use std::sync::Arc;
+use std::{ops::ControlFlow, sync::Arc};
 
 use effigy_avatar::{
-    Avatar, AvatarMesh, CanonicaliseConfig, Canonicaliser, DriveConfig, Driver, PoseField,
-    PoseInput, SignedDistanceField, TopologyConfig,
+    Avatar, AvatarMesh, CanonicaliseConfig, Canonicaliser, DriveConfig, Driver, KeyframeConfig,
+    KeyframeSelector, PoseField, PoseInput, SignedDistanceField, TopologyConfig,
+    export::write_ply,
+    fine_tune::{FineTuneConfig, fine_tune},
+    hyper,
     metrics::{measured_vertices, observed_mm, p2s_mm, surface_metrics},
 };
 use effigy_capture::{FrameId, FrameSource as _};
@@ -169,5 +172,80 @@ fn driving_a_perfect_field_gives_the_clothed_person_back() {
         assert!(of_avatar.d_f_cm < 0.2);
         assert!(of_avatar.d_f_cm < 0.2 * of_bare.d_f_cm);
         assert!(of_avatar.nc > of_bare.nc);
+    }
+}
+
+/// The whole chain behind tracking, with true poses: keyframes, canonical samples, a short fine-tuning, and
+/// poses the avatar has not seen.
+#[test]
+fn a_fine_tuned_avatar_is_nearer_to_the_person_than_the_bare_body() {
+    let body = builtin::body();
+    let seen: Vec<u64> = (20..380).step_by(12).collect();
+    let mut selector = KeyframeSelector::new(KeyframeConfig::default());
+    let frames = simulated(&seen);
+    for (frame, _) in &frames {
+        selector.consider(frame);
+    }
+    assert!(
+        selector.is_full(),
+        "{} keyframes",
+        selector.keyframes().len()
+    );
+    let canonicaliser = canonicaliser(&body, &frames[0].1);
+    let subject = canonicaliser.subject();
+    let samples: Vec<_> = selector
+        .keyframes()
+        .iter()
+        .map(|keyframe| canonicaliser.process(&keyframe.frame).unwrap().0)
+        .collect();
+    let config = FineTuneConfig { steps: 120, ..FineTuneConfig::default() };
+    let network = fine_tune(
+        hyper::prior(),
+        &samples,
+        subject.unit_box.metres_per_unit(),
+        &config,
+        &|| 0.0,
+        &mut |progress| {
+            if progress.step % 40 == 0 {
+                println!(
+                    "{}: {:.2} mm",
+                    progress.step,
+                    progress.held_out_residual_m * 1e3
+                );
+            }
+            ControlFlow::Continue(())
+        },
+    )
+    .unwrap();
+    let avatar = Avatar::new(
+        subject,
+        Arc::new(network),
+        &**canonicaliser.skinning(),
+        &selector.keyframes()[0].params.theta,
+        &TopologyConfig::default(),
+    )
+    .unwrap();
+    let mut driver = Driver::new(Arc::new(avatar), DriveConfig::default());
+    let measured = measured_vertices(&body);
+    for (frame, truth) in simulated(&[430, 520]) {
+        let driven = driver.pose(&truth.params, frame.id());
+        // `EFFIGY_PLY=folder` keeps the meshes, to look at.
+        if let Ok(folder) = std::env::var("EFFIGY_PLY") {
+            let path = std::path::Path::new(&folder).join(format!("tuned{}.ply", frame.id().0));
+            write_ply(&path, &driven, effigy_capture::Rigid3::IDENTITY).unwrap();
+        }
+        let bare = TriangleMesh::new(truth.minimal.vertices.clone(), body.triangles.clone());
+        let [of_avatar, of_bare] = [driven.to_mesh(), bare].map(|mesh| {
+            let observed = observed_mm(&observed_in_world(&frame), &mesh).unwrap();
+            let metrics = surface_metrics(&truth.clothed_in_world, &measured, &mesh);
+            let metrics = metrics.unwrap().unwrap();
+            println!(
+                "frame {}: {metrics:?}, observed {observed:.2} mm",
+                frame.id().0
+            );
+            (metrics, observed)
+        });
+        assert!(of_avatar.0.d_f_cm < 0.7 * of_bare.0.d_f_cm);
+        assert!(of_avatar.1 < 0.6 * of_bare.1);
     }
 }
