@@ -25,14 +25,18 @@ const FRAMES: [u64; 4] = [40, 150, 270, 400];
 fn simulated(frames: &[u64]) -> Vec<(RegisteredFrame, GroundTruth)> {
     let body = builtin::body();
     let scenario = Scenario::default();
-    let truth = Truth::new(&scenario, Arc::clone(&body)).unwrap();
-    let mut sensor = SimulatedSensor::new(&scenario, body).unwrap();
+    let truth = Truth::new(&scenario, Arc::clone(&body)).expect("the default scenario is valid");
+    let mut sensor = SimulatedSensor::new(&scenario, body).expect("the default scenario is valid");
     let mut cleaner = Cleaner::new(sensor.calibration().clone(), CleanConfig::default());
     frames
         .iter()
         .map(|&id| {
-            let frame = sensor.expose(FrameId(id)).unwrap();
-            let clean: CleanFrame = cleaner.process(&frame).unwrap();
+            let frame = sensor
+                .expose(FrameId(id))
+                .expect("a simulated frame has its size");
+            let clean: CleanFrame = cleaner
+                .process(&frame)
+                .expect("the frame has the calibrated size");
             let truth = truth.at(FrameId(id));
             let tracking = Tracking::Tracked {
                 params: truth.params,
@@ -55,7 +59,7 @@ fn canonicaliser(body: &Arc<BodyModel>, truth: &GroundTruth) -> Canonicaliser {
         &truth.params.betas,
         CanonicaliseConfig::default(),
     )
-    .unwrap()
+    .expect("the built-in body has vertices")
     .with_camera(&calibration.depth)
 }
 
