@@ -208,12 +208,6 @@ pub(crate) struct TrainPriorArgs {
     /// Which people, poses and points
     #[arg(long, default_value_t = 1)]
     pub(crate) seed: u64,
-    /// How many simulated people to learn from
-    #[arg(long, default_value_t = 24)]
-    pub(crate) people: usize,
-    /// How many poses of each
-    #[arg(long, default_value_t = 24)]
-    pub(crate) poses: usize,
     /// Go on from the checkpoint beside the output
     #[arg(long)]
     pub(crate) resume: bool,
