@@ -139,6 +139,15 @@ pub(crate) struct ChainArgs {
     /// Write the report here as well
     #[arg(long, value_name = "FILE")]
     pub(crate) json: Option<PathBuf>,
+    /// Save a picture of the window
+    #[arg(long, value_name = "FILE")]
+    pub(crate) screenshot: Option<PathBuf>,
+    /// When that is, in seconds
+    #[arg(long, value_name = "SECS", default_value_t = 20.0)]
+    pub(crate) screenshot_after: f32,
+    /// Close the window by itself
+    #[arg(long, value_name = "SECS")]
+    pub(crate) exit_after: Option<f32>,
     /// A body model in SMPL's layout (.npz) instead of the built-in one
     #[arg(long, value_name = "FILE")]
     pub(crate) body: Option<PathBuf>,

@@ -20,6 +20,11 @@ pub(crate) fn install() -> anyhow::Result<()> {
     .context("cannot catch Ctrl-C")
 }
 
+/// As if Ctrl-C had been pressed.
+pub(crate) fn request() {
+    REQUESTED.store(true, Ordering::Relaxed);
+}
+
 /// Whether the user wants to stop.
 pub(crate) fn requested() -> bool {
     REQUESTED.load(Ordering::Relaxed)

@@ -14,6 +14,8 @@ mod machine;
 mod pipeline;
 mod progress;
 mod report;
+#[cfg(feature = "window")]
+mod window;
 
 use std::process::ExitCode;
 

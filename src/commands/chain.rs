@@ -5,16 +5,21 @@ use std::{path::Path, sync::Arc};
 use effigy_capture::FrameSource;
 use effigy_registration::{BodyModel, smpl::builtin};
 use effigy_sim_sensor::Truth;
+use effigy_viewer::SnapshotSlot;
 
+#[cfg(feature = "window")]
+use crate::window;
 use crate::{
     cli::ChainArgs,
     machine::{Machine, peak_memory_mb},
     pipeline::{
         avatar_stage::{AvatarStage, Swap},
         clock::{Clock, percentile},
+        controls::Controls,
         evaluate::evaluate,
         lock_step,
         outputs::Outputs,
+        publish::Publisher,
         real_time,
         run_log::RunLog,
         settings::Settings,
@@ -37,7 +42,34 @@ pub(crate) enum Pace {
     RealTime,
 }
 
-pub(crate) fn run(mut input: Input, args: &ChainArgs) -> anyhow::Result<()> {
+/// With a window if that is wished and possible, headless otherwise.
+pub(crate) fn run(
+    open: impl Fn() -> anyhow::Result<Input> + Sync,
+    args: &ChainArgs,
+) -> anyhow::Result<()> {
+    #[cfg(feature = "window")]
+    if !args.headless {
+        let picture = args.screenshot.clone().map(|path| (path, args.screenshot_after));
+        let exit_after_secs = args.exit_after;
+        let shown = window::show(picture, exit_after_secs, |slot, controls| {
+            // A window shows things as they happen.
+            let input = Input { pace: Pace::RealTime, ..open()? };
+            run_chain(input, args, Some(slot), &controls)
+        })?;
+        match shown {
+            window::Shown::Closed => return Ok(()),
+            window::Shown::Impossible(reason) => eprintln!("effigy: {reason}; going on headless"),
+        }
+    }
+    run_chain(open()?, args, None, &Controls::none())
+}
+
+fn run_chain(
+    mut input: Input,
+    args: &ChainArgs,
+    window: Option<Arc<SnapshotSlot>>,
+    controls: &Controls,
+) -> anyhow::Result<()> {
     let clock = Clock::start();
     let body = body_model(args.body.as_deref())?;
     let mut settings = Settings::load(args.config.as_deref())?;
@@ -45,36 +77,24 @@ pub(crate) fn run(mut input: Input, args: &ChainArgs) -> anyhow::Result<()> {
     let name = input.source.name();
     let calibration = input.source.calibration().clone();
     let mut outputs = Outputs::new(args, &calibration, input.source.frame_count(), &body)?;
+    if let Some(slot) = window {
+        outputs.publish(Publisher::new(slot, name.clone(), &calibration, &body, clock));
+    }
     let swap = match input.pace {
         Pace::LockStep => Swap::AfterFrames(settings.schedule.swap_after_frames),
         Pace::RealTime => Swap::WhenReady,
     };
     let mut avatar = AvatarStage::new(Arc::clone(&body), &settings, swap, clock);
+    let stages = (&mut avatar, &mut outputs);
     let log = match input.pace {
-        Pace::LockStep => lock_step::run(
-            &mut *input.source,
-            &body,
-            &settings,
-            (&mut avatar, &mut outputs),
-            clock,
-        )?,
-        Pace::RealTime => real_time::run(
-            input.source,
-            &body,
-            &settings,
-            (&mut avatar, &mut outputs),
-            clock,
-        )?,
+        Pace::LockStep => lock_step::run(&mut *input.source, &body, &settings, stages, clock)?,
+        Pace::RealTime => {
+            real_time::run(input.source, &body, &settings, stages, (clock, controls))?
+        }
     };
     let mut report = report(name, &log);
     outputs.finish(&log, avatar.avatar(), input.truth.as_ref())?;
-    evaluate(
-        &mut report,
-        &log,
-        &body,
-        avatar.avatar(),
-        input.truth.as_ref(),
-    )?;
+    evaluate(&mut report, &log, &body, avatar.avatar(), input.truth.as_ref())?;
     report.seconds_total = clock.secs();
     report.peak_memory_mb = peak_memory_mb();
     report.write(&args.out.join("report.json"))?;

@@ -11,10 +11,10 @@ use crate::cli::DemoArgs;
 
 pub(crate) fn run(args: &DemoArgs) -> anyhow::Result<()> {
     let scenario = scenario(&args.scene)?;
-    let sensor = SimulatedSensor::new(&scenario, builtin::body())?;
-    let truth = Truth::new(&scenario, builtin::body())?;
-    chain::run(
-        Input { source: Box::new(sensor), truth: Some(truth), pace: Pace::LockStep },
-        &args.chain,
-    )
+    let open = || {
+        let sensor = SimulatedSensor::new(&scenario, builtin::body())?;
+        let truth = Truth::new(&scenario, builtin::body())?;
+        Ok(Input { source: Box::new(sensor), truth: Some(truth), pace: Pace::LockStep })
+    };
+    chain::run(open, &args.chain)
 }

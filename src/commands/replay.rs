@@ -16,13 +16,16 @@ use super::{
 use crate::cli::ReplayArgs;
 
 pub(crate) fn run(args: &ReplayArgs) -> anyhow::Result<()> {
-    let (source, truth) = open(args)?;
     let pace = if args.realtime {
         Pace::RealTime
     } else {
         Pace::LockStep
     };
-    chain::run(Input { source, truth, pace }, &args.chain)
+    let open = || {
+        let (source, truth) = open(args)?;
+        Ok(Input { source, truth, pace })
+    };
+    chain::run(open, &args.chain)
 }
 
 /// The source, and the truth if a simulator left its scenario in the recording.

@@ -140,6 +140,14 @@ impl AvatarStage {
             .collect()
     }
 
+    pub(crate) fn keyframe_count(&self) -> usize {
+        self.selector.keyframes().len()
+    }
+
+    pub(crate) fn keyframes_wanted(&self) -> usize {
+        self.settings.keyframes.count
+    }
+
     pub(crate) fn avatar(&self) -> Option<&Arc<Avatar>> {
         match &self.state {
             State::Driving(made) => Some(made.driver.avatar()),

@@ -30,7 +30,7 @@ pub(crate) fn run(
         log.registered(&registered);
         avatar.advance(&registered)?;
         let mesh = avatar.drive(&registered);
-        outputs.frame(&frame, &registered, mesh.as_ref(), avatar)?;
+        outputs.frame(&frame, &registered, mesh.as_ref(), (avatar, &log))?;
     }
     avatar.finish()?;
     log.timings.merge(tracking.timings);

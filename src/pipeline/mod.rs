@@ -3,11 +3,13 @@
 pub(crate) mod avatar_job;
 pub(crate) mod avatar_stage;
 pub(crate) mod clock;
+pub(crate) mod controls;
 pub(crate) mod evaluate;
 pub(crate) mod lock_step;
 pub(crate) mod outputs;
 pub(crate) mod pictures;
 pub(crate) mod poses;
+pub(crate) mod publish;
 pub(crate) mod real_time;
 pub(crate) mod run_log;
 pub(crate) mod settings;

@@ -19,6 +19,7 @@ use super::{
     avatar_stage::AvatarStage,
     pictures::{first_picture, save_sheet},
     poses::PoseLog,
+    publish::Publisher,
     run_log::{RunLog, TrackedSample},
 };
 use crate::{cli::ChainArgs, progress::Progress};
@@ -39,6 +40,7 @@ pub(crate) struct Outputs {
     moments: Vec<RegisteredFrame>,
     first_picture_done: bool,
     progress: Progress,
+    publisher: Option<Publisher>,
 }
 
 impl Outputs {
@@ -67,16 +69,44 @@ impl Outputs {
             moments: Vec::new(),
             first_picture_done: false,
             progress: Progress::new("frames", frame_count),
+            publisher: None,
         })
+    }
+
+    /// Shows every frame in a window too.
+    pub(crate) fn publish(&mut self, publisher: Publisher) {
+        self.publisher = Some(publisher);
+    }
+
+    /// A line for the person at the window.
+    pub(crate) fn say(&self, line: &str) {
+        if let Some(publisher) = &self.publisher {
+            publisher.say(line);
+        }
+    }
+
+    /// The avatar as it is now, when the person at the window asks for it.
+    pub(crate) fn export_now(&self, avatar: Option<&Arc<Avatar>>) -> anyhow::Result<()> {
+        let Some(avatar) = avatar else {
+            self.say("no avatar yet");
+            return Ok(());
+        };
+        let path = self.out.join("avatar.glb");
+        write_glb(&path, avatar, &GlbOptions::default())?;
+        self.say(&format!("avatar saved to {}", path.display()));
+        Ok(())
     }
 
     pub(crate) fn frame(
         &mut self,
         frame: &Frame,
-        registered: &RegisteredFrame,
+        registered: &Arc<RegisteredFrame>,
         mesh: Option<&AvatarMesh>,
-        avatar: &AvatarStage,
+        (avatar, log): (&AvatarStage, &RunLog),
     ) -> anyhow::Result<()> {
+        if let Some(publisher) = &mut self.publisher {
+            publisher.frame(frame, registered, mesh, avatar, log);
+        }
         if let Some((_, poses)) = &mut self.poses {
             poses.add(registered, &self.body);
         }
@@ -92,7 +122,7 @@ impl Outputs {
         }
         let due = frame.id.0 % self.moment_every == self.moment_every / 2;
         if due && registered.params().is_some() {
-            self.moments.push(registered.clone());
+            self.moments.push(RegisteredFrame::clone(registered));
         }
         self.progress.say(avatar.status());
         self.progress.advance(frame.id.0 + 1);
@@ -107,6 +137,9 @@ impl Outputs {
         truth: Option<&Truth>,
     ) -> anyhow::Result<()> {
         self.progress.finish();
+        if let Some(publisher) = &self.publisher {
+            publisher.finished();
+        }
         if let Some((path, poses)) = &self.poses {
             poses.write(path)?;
         }

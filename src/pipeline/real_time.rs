@@ -3,13 +3,14 @@
 use std::{sync::Arc, thread, time::Duration};
 
 use anyhow::{Context as _, anyhow};
-use crossbeam::channel::{Receiver, Sender, TrySendError, bounded};
+use crossbeam::channel::{Receiver, RecvTimeoutError, Sender, TrySendError, bounded};
 use effigy_capture::{Frame, FrameSource, Timestamp};
 use effigy_registration::{BodyModel, RegisteredFrame};
 
 use super::{
     avatar_stage::AvatarStage,
     clock::{Clock, Timings},
+    controls::Controls,
     outputs::Outputs,
     run_log::RunLog,
     settings::Settings,
@@ -19,6 +20,9 @@ use crate::interrupt;
 
 /// One frame waits while one is worked on; anything longer is latency.
 const QUEUE: usize = 1;
+
+/// Commands are looked at this often while no frame comes.
+const COMMANDS_EVERY: Duration = Duration::from_millis(50);
 
 struct Delivered {
     frame: Frame,
@@ -37,7 +41,7 @@ pub(crate) fn run(
     body: &Arc<BodyModel>,
     settings: &Settings,
     (avatar, outputs): (&mut AvatarStage, &mut Outputs),
-    clock: Clock,
+    (clock, controls): (Clock, &Controls),
 ) -> anyhow::Result<RunLog> {
     let tracking = TrackStage::new(source.calibration(), Arc::clone(body), settings, clock);
     let (to_track, frames) = bounded(QUEUE);
@@ -48,14 +52,14 @@ pub(crate) fn run(
         let capture = thread::Builder::new()
             .name("capture".to_owned())
             .spawn_scoped(scope, move || {
-                capture(&mut *source, &to_track, &stale_frames, clock)
+                capture(&mut *source, &to_track, &stale_frames, (clock, controls))
             })
             .context("cannot start the capture thread")?;
         let track = thread::Builder::new()
             .name("track".to_owned())
             .spawn_scoped(scope, move || track(tracking, &frames, &to_drive))
             .context("cannot start the tracking thread")?;
-        let driven = drive(&tracked, avatar, outputs, &mut log);
+        let driven = drive(&tracked, avatar, outputs, (&mut log, controls));
         // Closes the queue, so that the threads before it end too.
         drop(tracked);
         let timings = track.join().map_err(|_| anyhow!("tracking panicked"))??;
@@ -82,7 +86,7 @@ fn capture(
     source: &mut dyn FrameSource,
     to_track: &Sender<Delivered>,
     waiting: &Receiver<Delivered>,
-    clock: Clock,
+    (clock, controls): (Clock, &Controls),
 ) -> anyhow::Result<Captured> {
     let mut captured = Captured::default();
     let mut start: Option<(Timestamp, Duration)> = None;
@@ -90,7 +94,9 @@ fn capture(
         let Some(frame) = source.next_frame()? else {
             break;
         };
-        let (first, began) = *start.get_or_insert((frame.timestamp, clock.now()));
+        let (first, began) = start.get_or_insert((frame.timestamp, clock.now()));
+        *began += controls.wait_while_paused();
+        let (first, began) = (*first, *began);
         let due = began + Duration::from_secs_f64((frame.timestamp - first).max(0.0));
         thread::sleep(due.saturating_sub(clock.now()));
         captured.delivered += 1;
@@ -127,9 +133,15 @@ fn drive(
     tracked: &Receiver<Tracked>,
     avatar: &mut AvatarStage,
     outputs: &mut Outputs,
-    log: &mut RunLog,
+    (log, controls): (&mut RunLog, &Controls),
 ) -> anyhow::Result<()> {
-    for Tracked { frame, at, registered } in tracked {
+    loop {
+        controls.obey(avatar, outputs)?;
+        let Tracked { frame, at, registered } = match tracked.recv_timeout(COMMANDS_EVERY) {
+            Ok(next) => next,
+            Err(RecvTimeoutError::Timeout) => continue,
+            Err(RecvTimeoutError::Disconnected) => return Ok(()),
+        };
         let tuning = avatar.is_making();
         log.delivered(&frame);
         avatar.advance(&registered)?;
@@ -137,7 +149,6 @@ fn drive(
         let latency = log.clock.now().saturating_sub(at);
         log.latencies_ms.push((latency.as_secs_f32() * 1e3, tuning));
         log.registered(&registered);
-        outputs.frame(&frame, &registered, mesh.as_ref(), avatar)?;
+        outputs.frame(&frame, &registered, mesh.as_ref(), (avatar, log))?;
     }
-    Ok(())
 }

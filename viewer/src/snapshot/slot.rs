@@ -41,6 +41,11 @@ impl SnapshotSlot {
         self.waker.get_or_init(|| Box::new(waker));
     }
 
+    /// Whether a window shows what comes in.
+    pub fn is_watched(&self) -> bool {
+        self.waker.get().is_some()
+    }
+
     fn wake(&self) {
         if let Some(waker) = self.waker.get() {
             waker();
