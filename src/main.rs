@@ -6,7 +6,6 @@
     reason = "a program talks to its user"
 )]
 
-mod avatar_file;
 mod cli;
 mod commands;
 mod interrupt;

@@ -55,11 +55,6 @@ impl Progress {
         self.bar.set_message(message.into());
     }
 
-    /// A line that stays.
-    pub(crate) fn note(&self, line: &str) {
-        self.bar.suspend(|| eprintln!("{line}"));
-    }
-
     pub(crate) fn finish(&self) {
         self.bar.finish_and_clear();
     }

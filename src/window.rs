@@ -59,7 +59,9 @@ pub(crate) fn show(
         } else {
             interrupt::request();
         }
-        let worked = worker.join().map_err(|_| anyhow!("the pipeline panicked"))?;
+        let worked = worker
+            .join()
+            .map_err(|_| anyhow!("the pipeline panicked"))?;
         match shown {
             Ok(()) => worked.map(|()| Shown::Closed),
             Err(error) => Ok(Shown::Impossible(error)),

@@ -49,7 +49,10 @@ pub(crate) fn run(
 ) -> anyhow::Result<()> {
     #[cfg(feature = "window")]
     if !args.headless {
-        let picture = args.screenshot.clone().map(|path| (path, args.screenshot_after));
+        let picture = args
+            .screenshot
+            .clone()
+            .map(|path| (path, args.screenshot_after));
         let exit_after_secs = args.exit_after;
         let shown = window::show(picture, exit_after_secs, |slot, controls| {
             // A window shows things as they happen.
@@ -78,13 +81,19 @@ fn run_chain(
     let calibration = input.source.calibration().clone();
     let mut outputs = Outputs::new(args, &calibration, input.source.frame_count(), &body)?;
     if let Some(slot) = window {
-        outputs.publish(Publisher::new(slot, name.clone(), &calibration, &body, clock));
+        outputs.publish(Publisher::new(
+            slot,
+            name.clone(),
+            &calibration,
+            &body,
+            clock,
+        ));
     }
     let swap = match input.pace {
         Pace::LockStep => Swap::AfterFrames(settings.schedule.swap_after_frames),
         Pace::RealTime => Swap::WhenReady,
     };
-    let mut avatar = AvatarStage::new(Arc::clone(&body), &settings, swap, clock);
+    let mut avatar = AvatarStage::new(Arc::clone(&body), calibration.depth, &settings, swap, clock);
     let stages = (&mut avatar, &mut outputs);
     let log = match input.pace {
         Pace::LockStep => lock_step::run(&mut *input.source, &body, &settings, stages, clock)?,
@@ -94,7 +103,13 @@ fn run_chain(
     };
     let mut report = report(name, &log);
     outputs.finish(&log, avatar.avatar(), input.truth.as_ref())?;
-    evaluate(&mut report, &log, &body, avatar.avatar(), input.truth.as_ref())?;
+    evaluate(
+        &mut report,
+        &log,
+        &body,
+        avatar.avatar(),
+        input.truth.as_ref(),
+    )?;
     report.seconds_total = clock.secs();
     report.peak_memory_mb = peak_memory_mb();
     report.write(&args.out.join("report.json"))?;

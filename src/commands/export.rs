@@ -1,14 +1,17 @@
 //! `effigy export`: an avatar and a motion, for other programs.
 
-use effigy_avatar::export::{GlbOptions, write_glb};
+use effigy_avatar::{
+    Avatar,
+    export::{GlbOptions, write_glb},
+};
 use effigy_registration::motion::{Motion, RestBody};
 
 use super::chain::body_model;
-use crate::{avatar_file, cli::ExportArgs};
+use crate::cli::ExportArgs;
 
 pub(crate) fn run(args: &ExportArgs) -> anyhow::Result<()> {
     let body = body_model(args.body.as_deref())?;
-    let avatar = avatar_file::read(&args.avatar, &body.identity)?;
+    let avatar = Avatar::load(&args.avatar, body.identity)?;
     let motion = match &args.motion {
         Some(path) => Some(Motion::from_bvh(
             path,

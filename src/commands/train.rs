@@ -47,7 +47,11 @@ fn prior(args: &TrainPriorArgs) -> anyhow::Result<()> {
             bar.say(format!("{:?}, loss {:.2}", now.stage, now.loss));
             bar.advance(now.step.into());
         }
-        if interrupt::requested() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        if interrupt::requested() {
+            ControlFlow::Break(())
+        } else {
+            ControlFlow::Continue(())
+        }
     };
     let trained = train_prior(&source, &config, Some(&checkpoint), &mut on_progress)?;
     let Some(mut network) = trained else {

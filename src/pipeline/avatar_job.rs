@@ -18,6 +18,7 @@ use effigy_avatar::{
     keyframes::Keyframe,
     nn::Threads,
 };
+use effigy_capture::CameraModel;
 use effigy_registration::BodyModel;
 
 use super::{clock::Clock, settings::Settings};
@@ -47,7 +48,7 @@ pub(crate) struct JobFigures {
 
 impl AvatarJob {
     pub(crate) fn start(
-        keyframes: Vec<Keyframe>,
+        (keyframes, camera): (Vec<Keyframe>, CameraModel),
         body: &Arc<BodyModel>,
         settings: &Settings,
         clock: Clock,
@@ -57,6 +58,7 @@ impl AvatarJob {
         let (sender, result) = bounded(1);
         let work = Work {
             keyframes,
+            camera,
             body: Arc::clone(body),
             settings: settings.clone(),
             cancel: Arc::clone(&cancel),
@@ -116,6 +118,7 @@ fn lower_priority() {
 
 struct Work {
     keyframes: Vec<Keyframe>,
+    camera: CameraModel,
     body: Arc<BodyModel>,
     settings: Settings,
     cancel: Arc<AtomicBool>,
@@ -138,7 +141,8 @@ impl Work {
             Arc::clone(&self.body),
             &betas,
             self.settings.canonicalise.clone(),
-        )?;
+        )?
+        .with_camera(&self.camera);
         let samples: Vec<CanonicalSamples> = self
             .keyframes
             .iter()

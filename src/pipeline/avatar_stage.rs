@@ -5,7 +5,7 @@ use std::sync::Arc;
 use effigy_avatar::{
     Avatar, AvatarMesh, DriveConfig, Driver, KeyframeSelector, fine_tune::FineTuneProgress,
 };
-use effigy_capture::FrameId;
+use effigy_capture::{CameraModel, FrameId};
 use effigy_registration::{BodyModel, RegisteredFrame};
 
 use super::{
@@ -25,6 +25,7 @@ pub(crate) enum Swap {
 
 pub(crate) struct AvatarStage {
     body: Arc<BodyModel>,
+    camera: CameraModel,
     settings: Settings,
     swap: Swap,
     clock: Clock,
@@ -50,9 +51,16 @@ struct Made {
 }
 
 impl AvatarStage {
-    pub(crate) fn new(body: Arc<BodyModel>, settings: &Settings, swap: Swap, clock: Clock) -> Self {
+    pub(crate) fn new(
+        body: Arc<BodyModel>,
+        camera: CameraModel,
+        settings: &Settings,
+        swap: Swap,
+        clock: Clock,
+    ) -> Self {
         Self {
             body,
+            camera,
             settings: settings.clone(),
             swap,
             clock,
@@ -116,7 +124,12 @@ impl AvatarStage {
             return Ok(false);
         }
         let keyframes = self.selector.keyframes().to_vec();
-        let job = AvatarJob::start(keyframes, &self.body, &self.settings, self.clock)?;
+        let job = AvatarJob::start(
+            (keyframes, self.camera),
+            &self.body,
+            &self.settings,
+            self.clock,
+        )?;
         self.state = State::Making { job, frames_since_asked: 0 };
         Ok(true)
     }

@@ -4,8 +4,7 @@ use std::sync::Arc;
 
 use anyhow::Context as _;
 use effigy_avatar::{
-    Avatar, DriveConfig, Driver, mesher, metrics,
-    skinning::{ClosestBodyPoint, Skinning as _, Warp},
+    Avatar, DriveConfig, Driver, extract_posed, metrics, skinning::ClosestBodyPoint,
 };
 use effigy_capture::Rigid3;
 use effigy_fusion::{TriangleMesh, mesh::normals::vertex_normals};
@@ -174,26 +173,7 @@ impl<'a> FullSurface<'a> {
     }
 
     fn posed(&self, params: &BodyParams) -> TriangleMesh {
-        let subject = &self.avatar.subject;
-        let sdf = self.avatar.field.field(&subject.pose_input(&params.theta));
-        let in_unit = mesher::extract(&*sdf, RESOLUTION);
-        let in_canonical: Vec<Vec3> = in_unit
-            .vertices
-            .iter()
-            .map(|&vertex| subject.unit_box.canonical_from_unit(vertex))
-            .collect();
-        let warp = Warp::new(params, &subject.rest_joints);
-        let posed = self
-            .skinning
-            .forward(&in_canonical, &in_unit.normals)
-            .iter()
-            .zip(&in_canonical)
-            .map(|(skinned, &point)| {
-                warp.posed_from_canonical(&skinned.weights)
-                    .transform_point3(point)
-            })
-            .collect();
-        mesh(posed, &in_unit.triangles)
+        extract_posed(self.avatar, &self.skinning, params, RESOLUTION)
     }
 }
 

@@ -4,7 +4,7 @@ use std::{fs, path::PathBuf, sync::Arc};
 
 use anyhow::Context as _;
 use effigy_avatar::{
-    Avatar, AvatarMesh, checkpoint,
+    Avatar, AvatarMesh,
     export::{GlbOptions, write_glb, write_ply},
 };
 use effigy_capture::{Calibration, Frame};
@@ -147,7 +147,7 @@ impl Outputs {
         let sensor = &self.calibration.depth.intrinsics;
         save_sheet(&sheet, &self.moments, (sensor, &self.body), avatar, truth)?;
         if let Some(avatar) = avatar {
-            checkpoint::write(&self.out.join("avatar.effigy"), avatar)?;
+            avatar.save(&self.out.join("avatar.effigy"))?;
             let motion = self.tracked_motion(log);
             let options = GlbOptions { motion: Some(&motion), ..GlbOptions::default() };
             write_glb(&self.out.join("avatar.glb"), avatar, &options)?;

@@ -109,11 +109,13 @@ impl Publisher {
     }
 
     pub(crate) fn finished(&self) {
-        self.slot.update(|snapshot| snapshot.state = TrackState::Finished);
+        self.slot
+            .update(|snapshot| snapshot.state = TrackState::Finished);
     }
 
     pub(crate) fn say(&self, line: &str) {
-        self.slot.update(|snapshot| snapshot.message = Some(Arc::from(line)));
+        self.slot
+            .update(|snapshot| snapshot.message = Some(Arc::from(line)));
     }
 
     fn training(&mut self, avatar: &AvatarStage) -> Option<Arc<TrainingView>> {
@@ -122,7 +124,8 @@ impl Publisher {
             let step = f64::from(now.step);
             if now.step > view.step {
                 view.loss.push([step, now.loss.total()]);
-                view.held_out_mm.push([step, f64::from(now.held_out_residual_m) * 1e3]);
+                view.held_out_mm
+                    .push([step, f64::from(now.held_out_residual_m) * 1e3]);
             }
             view.step = now.step;
             view.steps = now.steps;
@@ -145,13 +148,19 @@ impl Publisher {
         let frames_per_sec = FIGURES_EVERY as f64 / (now - self.figures_at).max(1e-3);
         self.figures_at = now;
         let first = log.latencies_ms.len().saturating_sub(RECENT);
-        let recent: Vec<f32> = log.latencies_ms[first..].iter().map(|(ms, _)| *ms).collect();
+        let recent: Vec<f32> = log.latencies_ms[first..]
+            .iter()
+            .map(|(ms, _)| *ms)
+            .collect();
         let of = |share| percentile(&recent, share).unwrap_or(0.0) as f32;
-        let stages = [StageTiming {
-            name: "frame to avatar".to_owned(),
-            p50_ms: of(0.5),
-            p95_ms: of(0.95),
-        }];
+        let stages =
+            [
+                StageTiming {
+                    name: "frame to avatar".to_owned(),
+                    p50_ms: of(0.5),
+                    p95_ms: of(0.95),
+                },
+            ];
         Some(PerformanceView {
             frames_per_sec: frames_per_sec as f32,
             latency_p50_ms: of(0.5),
