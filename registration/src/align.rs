@@ -26,6 +26,9 @@ use crate::{
 pub struct EnergyConfig {
     /// What all depth points together are worth.
     pub data_weight: f32,
+    /// Where people wear clothes, depth is expected this far off the skin. A shape that only stays inside
+    /// the clothes would grow into them: girth explains an even layer as well as cloth does.
+    pub cloth_standoff_m: f32,
     /// A depth point this far outside the body costs one: clothes stand off the skin by this order.
     pub cloth_outside_m: f32,
     /// A depth point this far inside the body costs one: clothes are never there, noise and model errors are.
@@ -55,6 +58,7 @@ impl Default for EnergyConfig {
     fn default() -> Self {
         Self {
             data_weight: 400.0,
+            cloth_standoff_m: 0.010,
             cloth_outside_m: 0.020,
             cloth_inside_m: 0.008,
             outlier_m: 0.08,
@@ -208,6 +212,7 @@ impl Evidence {
                 inside_m: energy.cloth_inside_m,
                 outlier_m: energy.outlier_m * widen,
             },
+            standoff_m: energy.cloth_standoff_m,
             weight: energy.data_weight / self.point_count.max(1) as f32,
         };
         let per_vertex = energy.contradiction_weight / 1000.0;

@@ -18,11 +18,13 @@ pub(crate) struct Match {
     pub(crate) trust: f32,
 }
 
-/// `sum w(r) r^2`, `r = n . (p - x)`, positive where the point is outside the body.
+/// `sum w(r) r^2`, `r = n . (p - x) - standoff`, positive where the point is outside the expected clothes.
 #[derive(Clone, Debug)]
 pub(crate) struct PointToPlane<'a> {
     pub(crate) matches: &'a [Match],
     pub(crate) cloth: ClothSide,
+    /// How far clothes stand off the skin on average, where there are any.
+    pub(crate) standoff_m: f32,
     /// How many independent measurements one match is worth: neighbours share their errors.
     pub(crate) weight: f32,
 }
@@ -32,7 +34,8 @@ impl Term for PointToPlane<'_> {
         let mut row = Row::new(0.0, 0.0);
         for found in self.matches {
             let vertex = found.vertex as usize;
-            let distance_m = found.normal.dot(found.point - body.vertices[vertex]);
+            let standoff_m = self.standoff_m * body.shaped.surface.clothed[vertex];
+            let distance_m = found.normal.dot(found.point - body.vertices[vertex]) - standoff_m;
             let (weight, cost) = self.cloth.weight_and_cost(distance_m, found.sigma_m);
             let scale = self.weight * found.trust;
             row.restart(distance_m, weight * scale, cost * scale);
@@ -64,6 +67,11 @@ mod tests {
             })
             .collect();
         let cloth = ClothSide { outside_m: 0.02, inside_m: 0.008, outlier_m: 0.06 };
-        checker::assert_derivatives(&PointToPlane { matches: &matches, cloth, weight: 1.0 });
+        checker::assert_derivatives(&PointToPlane {
+            matches: &matches,
+            cloth,
+            standoff_m: 0.01,
+            weight: 1.0,
+        });
     }
 }

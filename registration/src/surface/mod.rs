@@ -27,6 +27,19 @@ pub(crate) struct Surface {
     /// For each vertex the joints that move it.
     pub(crate) influences: Vec<Influences>,
     pub(crate) pose_dirs: Vec<PoseDirection>,
+    /// For each vertex the share of it that clothes cover on most people: all but head, hands and feet.
+    pub(crate) clothed: Vec<f32>,
+}
+
+/// Neck, head, wrists, hands, ankles and feet.
+const BARE_BONES: [u8; 10] = [7, 8, 10, 11, 12, 15, 20, 21, 22, 23];
+
+fn clothed_share(weights: &VertexWeights) -> f32 {
+    let bones = weights.bones.iter().zip(&weights.weights);
+    bones
+        .filter(|(bone, _)| !BARE_BONES.contains(bone))
+        .map(|(_, weight)| weight)
+        .sum()
 }
 
 /// The joints that move a vertex, in ascending order, each with a mask of the vertex's bones it carries.
@@ -49,10 +62,12 @@ impl Surface {
             .iter()
             .map(|&v| model.skinning[v as usize])
             .collect();
+        let clothed = skinning.iter().map(clothed_share).collect();
         let influences = skinning.iter().map(Influences::new).collect();
         let pose_dirs = restrict(&model.pose_dirs, &coarse.vertices, model.vertex_count());
         Self {
             vertices: coarse.vertices,
+            clothed,
             triangles: coarse.triangles,
             skinning,
             influences,
