@@ -7,6 +7,8 @@ mod config;
 mod job;
 pub(crate) mod sampling;
 mod step;
+#[cfg(test)]
+mod tests;
 
 pub use config::{FineTuneConfig, SamplingConfig};
 pub use job::FineTuneJob;

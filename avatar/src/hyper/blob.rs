@@ -7,7 +7,7 @@ use safetensors::{Dtype, SafeTensors, serialize, tensor::TensorView};
 
 use super::{
     config::{HeadKind, HyperConfig},
-    network::{HyperNetwork, Provenance, Tensor},
+    network::{HyperNetwork, Provenance},
 };
 use crate::{PoseField, error::AvatarError};
 
@@ -29,12 +29,12 @@ pub enum Precision {
 impl HyperNetwork {
     /// The network as a safetensors file.
     pub fn to_bytes(&self, precision: Precision) -> Result<Vec<u8>, AvatarError> {
-        let stored: Vec<(Tensor<&[f32]>, Vec<u8>, Dtype)> = self
-            .tensors()
-            .into_iter()
+        let tensors = self.tensors();
+        let stored: Vec<_> = tensors
+            .iter()
             .map(|tensor| {
                 let is_short = precision == Precision::F16 && tensor.name.ends_with(".weight");
-                let (bytes, dtype) = if is_short {
+                let (bytes, dtype): (Vec<u8>, _) = if is_short {
                     let short = |x: &f32| f16::from_f32(*x).to_le_bytes();
                     (tensor.values.iter().flat_map(short).collect(), Dtype::F16)
                 } else {

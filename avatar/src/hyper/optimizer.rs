@@ -13,7 +13,7 @@ use crate::nn::{
     layer_norm::LayerNorm,
 };
 
-/// Mean hidden activation after LayerNorm and ReLU (seed-systems 1.3).
+/// Mean hidden activation after `LayerNorm` and `ReLU` (seed-systems 1.3).
 const MEAN_ACTIVATION: f32 = 0.4;
 /// A coefficient's least assumed size, for a basis whose coefficients are still zero.
 const LEAST_COEFFICIENT: f32 = 0.3;
@@ -149,7 +149,7 @@ impl HyperOptimizer {
                 head,
                 gradient,
                 &step,
-                &scaled(rates, share),
+                scaled(*rates, share),
                 self.rates.trunk * share,
             );
         }
@@ -244,7 +244,7 @@ impl HyperOptimizer {
     }
 }
 
-fn scaled(rates: &HeadRates, share: f32) -> HeadRates {
+fn scaled(rates: HeadRates, share: f32) -> HeadRates {
     let scale =
         |rates: LinearRates| LinearRates { weight: rates.weight * share, bias: rates.bias * share };
     HeadRates { coefficients: scale(rates.coefficients), output: scale(rates.output) }
@@ -270,7 +270,7 @@ impl HeadMoments {
         head: &mut Head,
         gradient: &HeadGradient,
         step: &AdamStep,
-        rates: &HeadRates,
+        rates: HeadRates,
         trunk: f32,
     ) {
         let trunk_rates = LinearRates { weight: trunk, bias: trunk };

@@ -31,7 +31,7 @@ pub(crate) struct PoseEncoder {
 #[derive(Clone, Debug)]
 pub(crate) struct EncoderCache {
     global_input: Vec<f32>,
-    /// Each joint's input and its hidden layer after ReLU; [rows, 19] each
+    /// Each joint's input and its hidden layer after `ReLU`; [rows, 19] each
     joints: Vec<[Vec<f32>; 2]>,
     /// [rows, 144]
     pub(crate) code: Vec<f32>,
@@ -86,7 +86,9 @@ impl PoseEncoder {
                 input.extend(parent_feature(joint, row, &global, &code));
             }
             let mut activation = hidden.forward(&input);
-            activation.iter_mut().for_each(|x| *x = x.max(0.0));
+            for x in &mut activation {
+                *x = x.max(0.0);
+            }
             let feature = output.forward(&activation);
             for (row, feature) in feature.chunks_exact(FEATURE_SIZE).enumerate() {
                 let start = row * CODE_SIZE + joint * FEATURE_SIZE;

@@ -12,7 +12,7 @@ use crate::{
 
 /// A stage and the steps it has done.
 pub(super) enum State {
-    Reptile { step: u32, reptile: Reptile },
+    Reptile { step: u32, reptile: Box<Reptile> },
     Joint { step: u32, joint: Box<Joint> },
 }
 
@@ -95,7 +95,7 @@ pub(super) fn read(
     };
     match metadata.get("stage").map(String::as_str) {
         Some("reptile") => {
-            let mut reptile = Reptile::new(config);
+            let mut reptile = Box::new(Reptile::new(config));
             let moments = &mut reptile.moments;
             let own = [
                 &mut reptile.parameters,

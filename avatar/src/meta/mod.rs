@@ -10,6 +10,8 @@ mod config;
 mod joint;
 mod reptile;
 mod task;
+#[cfg(test)]
+mod tests;
 mod train;
 
 pub use config::{JointConfig, PriorConfig, ReptileConfig};

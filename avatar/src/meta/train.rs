@@ -44,7 +44,7 @@ pub fn train_prior(
     threads.run(|| {
         let state = match checkpoint {
             Some(path) if path.exists() => checkpoint::read(path, config, source)?,
-            _ => State::Reptile { step: 0, reptile: Reptile::new(config) },
+            _ => State::Reptile { step: 0, reptile: Box::new(Reptile::new(config)) },
         };
         Training { source, config, checkpoint, on_progress }.run(state)
     })
@@ -86,7 +86,7 @@ impl Training<'_> {
     fn reptile(
         &mut self,
         mut step: u32,
-        mut reptile: Reptile,
+        mut reptile: Box<Reptile>,
     ) -> Result<Option<Vec<f32>>, AvatarError> {
         let steps = self.config.reptile.warm_up_steps + self.config.reptile.outer_steps;
         while step < steps {

@@ -45,6 +45,10 @@ impl AdamStep {
         }
     }
 
+    #[expect(
+        clippy::inline_always,
+        reason = "it must be compiled inside each vector unit's loop"
+    )]
     #[inline(always)]
     fn update(&self, rate: f32, gradient: f32, value: &mut f32, mean: &mut f32, square: &mut f32) {
         let AdamConfig { beta1, beta2, epsilon } = self.config;
@@ -188,4 +192,60 @@ fn step_rows(
             }
         },
     );
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn first_step_moves_every_parameter_by_the_rate_against_its_gradient() {
+        // With bias correction, mean / sqrt(square) of a single gradient is its sign.
+        let mut values = vec![1.0_f32, 2.0, 3.0];
+        let mut moments = Moments::zeros(3);
+        let step = AdamStep::new(AdamConfig::default(), 1);
+        moments.step(&step, 0.01, &[5.0, -1e-3, 0.0], &mut values);
+        let expected = [0.99, 2.01, 3.0];
+        // The epsilon of 1e-8 beside a gradient of 1e-3, and f32 rounding at 2.
+        assert!(
+            values
+                .iter()
+                .zip(expected)
+                .all(|(a, b)| (a - b).abs() < 1e-6),
+            "{values:?}"
+        );
+    }
+
+    #[test]
+    fn outer_product_gradients_step_as_written_out_ones_do() {
+        let (inputs, outputs, rows) = (5, 2 * ROWS_PER_PIECE + 3, 3);
+        let wave = |count: usize, phase: f32| -> Vec<f32> {
+            (0..count)
+                .map(|i| (i as f32 * 0.37 + phase).sin())
+                .collect()
+        };
+        let mut layer = Linear::zeros(inputs, outputs);
+        layer.weight = wave(inputs * outputs, 0.3);
+        let gradient = OuterGradient {
+            input: wave(rows * inputs, 0.1),
+            output_bar: wave(rows * outputs, 0.2),
+        };
+        let (weight_gradient, bias_gradient) = gradient.written_out(&layer);
+        let (mut weight, mut bias) = (layer.weight.clone(), layer.bias.clone());
+        let (mut plain, mut moments) = (LinearMoments::new(&layer), LinearMoments::new(&layer));
+        let rates = LinearRates { weight: 1e-2, bias: 1e-3 };
+        for number in 1..=3 {
+            let step = AdamStep::new(AdamConfig::default(), number);
+            moments.step(&step, rates, &gradient, &mut layer);
+            plain
+                .weight
+                .step(&step, rates.weight, &weight_gradient, &mut weight);
+            plain
+                .bias
+                .step(&step, rates.bias, &bias_gradient, &mut bias);
+        }
+        // The sums over three rows may be fused; a near-zero gradient's direction can then differ a little.
+        let close = |a: &[f32], b: &[f32]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-4);
+        assert!(close(&layer.weight, &weight) && close(&layer.bias, &bias));
+    }
 }

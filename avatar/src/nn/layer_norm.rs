@@ -1,4 +1,4 @@
-//! Layer normalisation with scale and shift, followed by ReLU.
+//! Layer normalisation with scale and shift, followed by `ReLU`.
 
 /// `relu(scale * (x - mean) / sqrt(variance + 1e-5) + shift)`, each row by itself.
 #[derive(Clone, Debug, PartialEq)]
@@ -17,7 +17,7 @@ pub(crate) struct NormCache {
     normalised: Vec<f32>,
     /// 1 / deviation; [rows]
     inverse_deviation: Vec<f32>,
-    /// After ReLU; [rows, width]
+    /// After `ReLU`; [rows, width]
     pub(crate) output: Vec<f32>,
 }
 

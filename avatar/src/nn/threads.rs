@@ -28,6 +28,10 @@ pub struct Threads {
 
 impl Threads {
     /// Builds the pool; `at_start` runs once on each thread (the place to lower its priority).
+    #[expect(
+        clippy::trivially_copy_pass_by_ref,
+        reason = "configurations are lent everywhere"
+    )]
     pub fn new(
         config: &ThreadsConfig,
         at_start: impl Fn() + Send + Sync + 'static,

@@ -24,7 +24,7 @@ impl SirenConfig {
     pub const PAPER: Self = Self { hidden: 256, layers: 7 };
 
     /// Inputs and outputs of a layer.
-    pub fn layer_size(&self, layer: usize) -> (usize, usize) {
+    pub fn layer_size(self, layer: usize) -> (usize, usize) {
         let inputs = if layer == 0 { 3 } else { self.hidden };
         let outputs = if layer + 1 == self.layers {
             1
@@ -35,42 +35,38 @@ impl SirenConfig {
     }
 
     /// Weights and biases of a layer.
-    pub fn layer_parameters(&self, layer: usize) -> usize {
+    pub fn layer_parameters(self, layer: usize) -> usize {
         let (inputs, outputs) = self.layer_size(layer);
         inputs * outputs + outputs
     }
 
-    pub fn parameter_count(&self) -> usize {
+    pub fn parameter_count(self) -> usize {
         (0..self.layers)
             .map(|layer| self.layer_parameters(layer))
             .sum()
     }
 
     /// Where a layer's parameters lie: the weight, row-major (out x in), then the bias.
-    pub fn layer_range(&self, layer: usize) -> Range<usize> {
+    pub fn layer_range(self, layer: usize) -> Range<usize> {
         let start = (0..layer).map(|before| self.layer_parameters(before)).sum();
         start..start + self.layer_parameters(layer)
     }
 
     /// A layer's weight and bias.
-    pub fn split<'a>(&self, parameters: &'a [f32], layer: usize) -> (&'a [f32], &'a [f32]) {
+    pub fn split(self, parameters: &[f32], layer: usize) -> (&[f32], &[f32]) {
         let (inputs, outputs) = self.layer_size(layer);
         parameters[self.layer_range(layer)].split_at(inputs * outputs)
     }
 
     /// A layer's weight and bias.
-    pub fn split_mut<'a>(
-        &self,
-        parameters: &'a mut [f32],
-        layer: usize,
-    ) -> (&'a mut [f32], &'a mut [f32]) {
+    pub fn split_mut(self, parameters: &mut [f32], layer: usize) -> (&mut [f32], &mut [f32]) {
         let (inputs, outputs) = self.layer_size(layer);
         parameters[self.layer_range(layer)].split_at_mut(inputs * outputs)
     }
 
     /// Multiply-adds of one point's training step: value, gradient and the backward pass through both,
     /// six products of the forward pass's size.
-    pub fn training_multiply_adds(&self) -> usize {
+    pub fn training_multiply_adds(self) -> usize {
         6 * (0..self.layers)
             .map(|layer| {
                 let (inputs, outputs) = self.layer_size(layer);

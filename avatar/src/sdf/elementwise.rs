@@ -293,6 +293,10 @@ pub(super) fn first_weight(
     );
 }
 
+#[expect(
+    clippy::inline_always,
+    reason = "compiled inside each vector unit's loop"
+)]
 #[inline(always)]
 fn dot(a: &[f32], b: &[f32]) -> f32 {
     let (a_chunks, a_rest) = a.as_chunks::<LANES>();

@@ -117,7 +117,7 @@ impl SpareWorkspaces {
 
     pub(crate) fn with<R>(&self, work: impl FnOnce(&mut Workspace) -> R) -> R {
         let taken = self.lock().pop();
-        let mut workspace = taken.unwrap_or_else(|| Workspace::new(&self.config));
+        let mut workspace = taken.unwrap_or_else(|| Workspace::new(self.config));
         let result = work(&mut workspace);
         self.lock().push(workspace);
         result

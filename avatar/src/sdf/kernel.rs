@@ -21,13 +21,16 @@ use super::{
 use crate::nn::matmul::{View, Write, multiply};
 
 /// Points of one tile: 64 x 128 floats are 32 KiB, and a live tile's 24 arrays 0.8 MiB.
-pub(crate) const TILE: usize = 64;
+pub(crate) const TILE: usize = 128;
 
 /// A network's parameters, seen layer by layer, with the first layer's weight by columns.
 pub(crate) struct Network<'a> {
     config: SirenConfig,
     parameters: &'a [f32],
     first_columns: [Vec<f32>; 3],
+    /// Each hidden weight turned, `[inputs, outputs]`: products with it run a third faster than with a
+    /// turned view of the weight. [layers - 2]
+    turned: Vec<Vec<f32>>,
 }
 
 impl<'a> Network<'a> {
@@ -40,7 +43,19 @@ impl<'a> Network<'a> {
         let (weight, _) = config.split(parameters, 0);
         let first_columns =
             std::array::from_fn(|axis| weight.iter().skip(axis).step_by(3).copied().collect());
-        Self { config, parameters, first_columns }
+        let turned = (1..config.layers - 1)
+            .map(|layer| turned(config.split(parameters, layer).0, config.hidden))
+            .collect();
+        Self { config, parameters, first_columns, turned }
+    }
+
+    /// The weight of a hidden layer for products from the right: `[inputs, outputs]`.
+    fn turned(&self, layer: usize) -> View<'_> {
+        View::new(
+            &self.turned[layer - 1],
+            self.config.hidden,
+            self.config.hidden,
+        )
     }
 
     fn layer(&self, layer: usize) -> (&'a [f32], &'a [f32]) {
@@ -58,6 +73,11 @@ impl<'a> Network<'a> {
     fn sines(&self) -> usize {
         self.config.layers - 1
     }
+}
+
+fn turned(weight: &[f32], hidden: usize) -> Vec<f32> {
+    let column = |k: usize| weight.iter().skip(k).step_by(hidden).copied();
+    (0..hidden).flat_map(column).collect()
 }
 
 /// The buffers of one tile, reused from tile to tile.
@@ -82,7 +102,7 @@ struct LayerBuffers {
 }
 
 impl Workspace {
-    pub(crate) fn new(config: &SirenConfig) -> Self {
+    pub(crate) fn new(config: SirenConfig) -> Self {
         let size = TILE * config.hidden;
         let layer = || LayerBuffers {
             tangent_and_h: vec![0.0; 2 * size],
@@ -116,9 +136,13 @@ pub(crate) fn values(work: &mut Workspace, net: &Network<'_>, points: &[Vec3], o
     );
     pass::first_layer_value(points, net.columns(), net.layer(0).1, h);
     for layer in 1..net.sines() {
-        let (weight, bias) = net.layer(layer);
-        let weight = View::new(weight, hidden, hidden).transposed();
-        multiply(next, Write::Replace, View::new(h, count, hidden), weight);
+        let bias = net.layer(layer).1;
+        multiply(
+            next,
+            Write::Replace,
+            View::new(h, count, hidden),
+            net.turned(layer),
+        );
         pass::sine_layer_value(bias, next);
         std::mem::swap(&mut h, &mut next);
     }
@@ -134,13 +158,12 @@ pub(crate) fn values_and_gradients(work: &mut Workspace, net: &Network<'_>, poin
         let (before, from) = work.layers.split_at_mut(layer);
         let LayerBuffers { tangent_and_h, cosine, .. } = &mut from[0];
         let (h, cosine) = (&mut tangent_and_h[size..2 * size], &mut cosine[..size]);
-        let (weight, bias) = net.layer(layer);
+        let bias = net.layer(layer).1;
         match before.last() {
             None => pass::first_layer(points, net.columns(), bias, h, cosine),
             Some(previous) => {
                 let input = View::new(&previous.tangent_and_h[size..], count, hidden);
-                let weight = View::new(weight, hidden, hidden).transposed();
-                multiply(h, Write::Replace, input, weight);
+                multiply(h, Write::Replace, input, net.turned(layer));
                 pass::sine_layer(bias, h, cosine);
             }
         }
@@ -188,8 +211,7 @@ fn tangent_sweep(work: &mut Workspace, net: &Network<'_>, count: usize) {
         let activation = Activation { sine: &h[..size], cosine: &cosine[..size] };
         if let Some(previous) = before.last() {
             let input = View::new(&previous.tangent_and_h, count, hidden);
-            let weight = View::new(net.layer(layer).0, hidden, hidden).transposed();
-            multiply(t, Write::Replace, input, weight);
+            multiply(t, Write::Replace, input, net.turned(layer));
             if layer == last {
                 pass::last_tangent(net.layer(last + 1).0, activation, t, z);
             } else {

@@ -8,10 +8,14 @@
 /// 1.5 * 2^23: adding it rounds to the nearest integer and leaves that integer in the low bits.
 const ROUND: f32 = 12_582_912.0;
 const PI_HIGH: f32 = 3.140_625;
-const PI_MIDDLE: f32 = 9.675_025_9e-4;
+const PI_MIDDLE: f32 = 9.675_026e-4;
 const PI_LOW: f32 = 1.509_958e-7;
 
 /// `(sin(angle_rad), cos(angle_rad))`. NaN in, NaN out.
+#[expect(
+    clippy::inline_always,
+    reason = "compiled inside each vector unit's loop"
+)]
 #[inline(always)]
 pub(crate) fn sincos(angle_rad: f32) -> (f32, f32) {
     let shifted = angle_rad.mul_add(std::f32::consts::FRAC_1_PI, ROUND);
@@ -44,6 +48,10 @@ pub(crate) fn sincos(angle_rad: f32) -> (f32, f32) {
 }
 
 /// Horner's rule, highest power first.
+#[expect(
+    clippy::inline_always,
+    reason = "compiled inside each vector unit's loop"
+)]
 #[inline(always)]
 fn polynomial<const N: usize>(x: f32, coefficients: [f32; N]) -> f32 {
     let mut sum = coefficients[0];

@@ -1,0 +1,171 @@
+//! Fine-tuning on a ball whose size depends on the pose: the truth is a formula.
+
+use std::ops::ControlFlow;
+
+use effigy_registration::smpl::{JOINT_COUNT, rotation_from_axis_angle};
+use glam::Vec3;
+use rand::{SeedableRng as _, rngs::StdRng};
+
+use super::{
+    FineTuneConfig, FineTuneJob, FineTuner, SamplingConfig, fine_tune, sampling::random_in_box,
+};
+use crate::{
+    AvatarError, CanonicalSamples, PoseInput, SignedDistanceField as _,
+    hyper::{HeadKind, HyperConfig, HyperNetwork},
+    nn::{Threads, ThreadsConfig},
+    sdf::{SirenConfig, SirenField},
+};
+
+const SMALL: HyperConfig =
+    HyperConfig { field: SirenConfig { hidden: 32, layers: 4 }, heads: HeadKind::LowRank(4) };
+
+/// A keyframe with the elbow bent by this much; the ball grows with it.
+fn keyframe(bend_rad: f32) -> CanonicalSamples {
+    let mut theta = [Vec3::ZERO; JOINT_COUNT];
+    theta[18].y = bend_rad;
+    let mut rng = StdRng::seed_from_u64(u64::from(bend_rad.to_bits()));
+    let normals: Vec<Vec3> = (0..800)
+        .map(|_| random_in_box(&mut rng).normalize_or(Vec3::X))
+        .collect();
+    let radius = radius(bend_rad);
+    CanonicalSamples {
+        theta,
+        pose: pose(bend_rad),
+        points_in_unit: normals.iter().map(|n| *n * radius).collect(),
+        weights: vec![1.0; normals.len()],
+        free_in_unit: normals.iter().map(|n| *n * (radius + 0.1)).collect(),
+        normals,
+    }
+}
+
+fn pose(bend_rad: f32) -> PoseInput {
+    let mut rotations = [glam::Mat3::IDENTITY; JOINT_COUNT];
+    rotations[18] = rotation_from_axis_angle(Vec3::Y * bend_rad);
+    PoseInput { rotations, joints_in_unit: [Vec3::ZERO; JOINT_COUNT] }
+}
+
+fn radius(bend_rad: f32) -> f32 {
+    0.5 + 0.05 * bend_rad
+}
+
+fn config() -> FineTuneConfig {
+    FineTuneConfig {
+        steps: 120,
+        held_out_every: 40,
+        sampling: SamplingConfig {
+            surface: 160,
+            near: 64,
+            free: 32,
+            uniform: 64,
+            ..Default::default()
+        },
+        rates: crate::hyper::RateConfig { field: 2e-3, ..Default::default() },
+        ..FineTuneConfig::default()
+    }
+}
+
+fn network() -> HyperNetwork {
+    let mut rng = StdRng::seed_from_u64(3);
+    let meta = SirenField::init(SMALL.field, &mut rng);
+    HyperNetwork::init(SMALL, &meta, &mut rng)
+}
+
+fn keyframes() -> Vec<CanonicalSamples> {
+    [0.0, 0.5, 1.0].map(keyframe).to_vec()
+}
+
+fn learned(config: &FineTuneConfig) -> HyperNetwork {
+    let mut ignore = |_: &_| ControlFlow::Continue(());
+    fine_tune(network(), &keyframes(), 1.0, config, &|| 0.0, &mut ignore).unwrap()
+}
+
+#[test]
+fn a_ball_that_grows_with_the_pose_is_learned_with_its_sign() {
+    let mut residuals_m = Vec::new();
+    let mut report = |now: &super::FineTuneProgress| {
+        residuals_m.push(now.held_out_residual_m);
+        ControlFlow::Continue(())
+    };
+    let config = FineTuneConfig { steps: 400, ..config() };
+    let network = fine_tune(network(), &keyframes(), 1.0, &config, &|| 0.0, &mut report).unwrap();
+    // A network of 32 units after 400 steps: a hundredth of the ball's radius.
+    assert!(*residuals_m.last().unwrap() < 0.006, "{residuals_m:?}");
+    for bend_rad in [0.0, 0.75] {
+        let radius = radius(bend_rad);
+        let points = [Vec3::X * (radius - 0.05), Vec3::X * (radius + 0.05)];
+        let mut values = [0.0; 2];
+        network.field(&pose(bend_rad)).values(&points, &mut values);
+        assert!(values[0] < -0.03 && values[1] > 0.03, "{values:?}");
+    }
+}
+
+#[test]
+fn the_result_depends_on_the_seed_alone_not_on_the_threads() {
+    let config = FineTuneConfig { steps: 12, ..config() };
+    let on = |count: usize| {
+        let threads = Threads::new(&ThreadsConfig { count }, || {}).unwrap();
+        threads.run(|| learned(&config))
+    };
+    let one = on(1);
+    assert_eq!(one, on(3));
+    assert_ne!(one, learned(&FineTuneConfig { seed: 2, ..config }));
+}
+
+#[test]
+fn points_of_weight_zero_are_never_drawn() {
+    let mut spoiled = keyframes();
+    for samples in &mut spoiled {
+        samples.points_in_unit.push(Vec3::splat(0.9));
+        samples.normals.push(Vec3::X);
+        samples.weights.push(0.0);
+    }
+    let config = FineTuneConfig { steps: 5, held_out_share: 0.0, ..config() };
+    let mut ignore = |_: &_| ControlFlow::Continue(());
+    let with = fine_tune(network(), &spoiled, 1.0, &config, &|| 0.0, &mut ignore).unwrap();
+    assert_eq!(with, learned(&config));
+}
+
+#[test]
+fn a_job_reports_its_progress_and_can_be_stopped() {
+    let config = FineTuneConfig { steps: 1_000_000, ..config() };
+    let job = FineTuneJob::start(network(), keyframes(), 1.0, config, || 0.0, || {}).unwrap();
+    while job.progress().step < 2 {
+        std::thread::yield_now();
+    }
+    assert!(job.progress().loss.total().is_finite());
+    job.cancel();
+    assert_ne!(job.finish().unwrap(), network());
+}
+
+#[test]
+fn rates_that_blow_up_end_in_an_error() {
+    let mut config = config();
+    config.rates.field = 1e30;
+    config.warm_up_steps = 1;
+    let mut ignore = |_: &_| ControlFlow::Continue(());
+    let error = fine_tune(network(), &keyframes(), 1.0, &config, &|| 0.0, &mut ignore).unwrap_err();
+    assert!(
+        matches!(error, AvatarError::LossNotFinite { .. }),
+        "{error}"
+    );
+}
+
+#[test]
+fn unusable_keyframes_are_named() {
+    let refuse = |samples: &[CanonicalSamples]| {
+        FineTuner::new(network(), samples, 1.0, &config())
+            .err()
+            .expect("it is refused")
+            .to_string()
+    };
+    assert!(refuse(&[]).contains("at least one keyframe"));
+    let mut empty = keyframes();
+    empty[1].weights.fill(0.0);
+    assert!(refuse(&empty).contains("keyframe 1"));
+    let mut uneven = keyframes();
+    uneven[2].normals.pop();
+    assert!(refuse(&uneven).contains("keyframe 2"));
+    let mut broken = keyframes();
+    broken[0].points_in_unit[5].y = f32::NAN;
+    assert!(refuse(&broken).contains("not finite"));
+}
