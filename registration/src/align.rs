@@ -39,6 +39,8 @@ pub struct EnergyConfig {
     pub reach_m: f32,
     /// A radian between the normals counts like this much distance in matching.
     pub direction_m: f32,
+    /// Normals whose cosine is this or less do not match.
+    pub oblique: f32,
     /// What all vertices together are worth if they contradict the silhouette or the depth.
     pub contradiction_weight: f32,
     /// A vertex this far outside the silhouette, or in front of the depth, costs one.
@@ -62,15 +64,16 @@ impl Default for EnergyConfig {
             cloth_outside_m: 0.020,
             cloth_inside_m: 0.008,
             outlier_m: 0.08,
-            reach_m: 0.25,
+            reach_m: 0.12,
             direction_m: 0.08,
+            oblique: 0.3,
             contradiction_weight: 400.0,
             contradiction_m: 0.02,
             silhouette_slack_m: 0.012,
             pose_prior_weight: 0.5,
             temporal_weight: 1.0,
-            temporal_rotation_rad: 0.25,
-            temporal_trans_m: 0.05,
+            temporal_rotation_rad: 0.12,
+            temporal_trans_m: 0.02,
             floor_m: 0.01,
             joint_limit_rad: 0.05,
         }
@@ -93,9 +96,14 @@ pub(crate) struct Effort {
     pub(crate) every: usize,
     /// Self-occlusion by drawing, or only by facing.
     pub(crate) drawn_visibility: bool,
-    /// Factor on reach and outlier scale in the first round; it falls to one in the last.
+    /// Factor on the outlier scale in the first round; it falls to one in the last.
     pub(crate) widen: f32,
+    /// From this share of the rounds on a step that gains nothing ends the alignment.
+    pub(crate) settled_from: f32,
 }
+
+/// A step that lowers the energy by less than this share is the last.
+const SMALLEST_DESCENT: f64 = 0.004;
 
 /// A body brought onto an observation.
 #[derive(Clone, Debug)]
@@ -104,6 +112,8 @@ pub(crate) struct Aligned {
     pub(crate) agreement: Agreement,
     /// Of the inlier points to the surface.
     pub(crate) residual_rms_m: f32,
+    /// Share of the depth points that no visible part of the body is near: a limb gone astray leaves them behind.
+    pub(crate) stray: f32,
     pub(crate) joint_confidence: [f32; JOINT_COUNT],
     pub(crate) termination: Termination,
     pub(crate) rounds: usize,
@@ -152,7 +162,7 @@ pub(crate) fn align(
         });
         (body, termination) = outcome;
         rounds += 1;
-        if !termination.may_go_on() {
+        if !termination.may_go_on(SMALLEST_DESCENT) && progress >= effort.settled_from {
             break;
         }
     }
@@ -160,6 +170,7 @@ pub(crate) fn align(
         state: body.state,
         agreement: renderer.agreement(&body, &observation.view),
         residual_rms_m: rms_m(&body, &evidence.matches, context.energy.outlier_m),
+        stray: stray(&body, &evidence.matches, points.len()),
         joint_confidence: joint_confidence(&shaped.surface, &evidence.matches, points.len()),
         termination,
         rounds,
@@ -178,8 +189,9 @@ impl Evidence {
     ) {
         let energy = context.energy;
         let matching = MatchConfig {
-            reach_m: energy.reach_m * self.widen.max(1.0),
+            reach_m: energy.reach_m * self.widen.clamp(1.0, 3.0),
             direction_m: energy.direction_m,
+            oblique: energy.oblique,
         };
         self.point_count = points.len();
         match_points(points, body, visibility, &matching, &mut self.matches);
@@ -230,7 +242,7 @@ impl Evidence {
             axis_in_world: camera.rotate(Vec3::Z),
             camera_in_world: camera.translation,
             sigma_m: energy.contradiction_m,
-            outlier_m: 0.15 * widen,
+            outlier_m: 0.3,
             weight: 0.5 * per_vertex,
         };
         let floor =
@@ -287,6 +299,16 @@ fn rms_m(body: &PosedSurface<'_>, matches: &[Match], outlier_m: f32) -> f32 {
         }
     }
     (sum / f64::from(count.max(1))).sqrt() as f32
+}
+
+fn stray(body: &PosedSurface<'_>, matches: &[Match], points: usize) -> f32 {
+    /// Loose clothes stand off less than this.
+    const NEAR_M: f32 = 0.09;
+    let near = matches
+        .iter()
+        .filter(|m| m.point.distance(body.vertices[m.vertex as usize]) < NEAR_M)
+        .count();
+    1.0 - near as f32 / points.max(1) as f32
 }
 
 /// From how much of each bone is matched: a thousandth of all points on a bone shows it somewhat, a hundredth well.

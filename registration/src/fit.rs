@@ -161,45 +161,79 @@ impl ShapeFit {
         found.0
     }
 
-    /// One Gauss-Newton step of all poses and the betas: each pose is eliminated from its frame's system.
+    /// One step of the estimate in progress.
     fn round(&mut self, config: &FitConfig, context: &Context<'_>) {
-        let Some(running) = &mut self.running else {
-            return;
-        };
-        running.rounds_done += 1;
-        let shaped = ShapedSurface::new(Arc::clone(&self.surface), running.betas);
-        let mut sum = NormalEquations::new(BETA_COUNT);
-        let mut eliminated = Vec::with_capacity(self.views.len());
-        for view in &self.views {
-            let part = linearise(view, &shaped, config, context).eliminate(
-                POSE_UNKNOWNS,
-                RELATIVE_DAMPING,
-                1e-3,
+        if let Some(running) = &mut self.running {
+            running.rounds_done += 1;
+            round(
+                &self.surface,
+                &mut self.views,
+                &mut running.betas,
+                config,
+                context,
             );
-            if let Some(part) = &part {
-                sum.add(&part.rest);
-            }
-            eliminated.push(part);
-        }
-        sum.add(&prior(&shaped, running.betas, config));
-        let Some(mut betas_step) = sum.solve(RELATIVE_DAMPING, 1e-6) else {
-            return;
-        };
-        shorten(&mut betas_step);
-        for (beta, &step) in running.betas.iter_mut().zip(&betas_step) {
-            *beta = (*beta + step as f32).clamp(-4.0, 4.0);
-        }
-        for (view, part) in self.views.iter_mut().zip(&eliminated) {
-            if let Some(part) = part {
-                let mut step = part.first_step(&betas_step);
-                shorten(&mut step);
-                view.state = view.state.moved_by(&step);
-            }
-            view.state.betas = running.betas;
         }
     }
 }
 
+/// A first idea of the shape from one frame, and the pose that goes with it.
+pub(crate) fn fit_one(
+    surface: &Arc<Surface>,
+    observation: &Observation,
+    state: &BodyState,
+    config: &FitConfig,
+    context: &Context<'_>,
+) -> BodyState {
+    let mut views = [StoredView { observation: observation.clone(), state: *state }];
+    let mut betas = state.betas;
+    for _ in 0..config.rounds {
+        round(surface, &mut views, &mut betas, config, context);
+    }
+    views[0].state
+}
+
+/// One Gauss-Newton step of all poses and the betas: each pose is eliminated from its frame's system.
+fn round(
+    surface: &Arc<Surface>,
+    views: &mut [StoredView],
+    betas: &mut [f32; BETA_COUNT],
+    config: &FitConfig,
+    context: &Context<'_>,
+) {
+    let shaped = ShapedSurface::new(Arc::clone(surface), *betas);
+    let mut sum = NormalEquations::new(BETA_COUNT);
+    let mut eliminated = Vec::with_capacity(views.len());
+    for view in views.iter() {
+        let part = linearise(view, &shaped, config, context).eliminate(
+            POSE_UNKNOWNS,
+            RELATIVE_DAMPING,
+            1e-3,
+        );
+        if let Some(part) = &part {
+            sum.add(&part.rest);
+        }
+        eliminated.push(part);
+    }
+    sum.add(&prior(&shaped, *betas, config));
+    let Some(mut betas_step) = sum.solve(RELATIVE_DAMPING, 1e-6) else {
+        return;
+    };
+    shorten(&mut betas_step);
+    for (beta, &step) in betas.iter_mut().zip(&betas_step) {
+        *beta = (*beta + step as f32).clamp(-MOST_UNUSUAL, MOST_UNUSUAL);
+    }
+    for (view, part) in views.iter_mut().zip(&eliminated) {
+        if let Some(part) = part {
+            let mut step = part.first_step(&betas_step);
+            shorten(&mut step);
+            view.state = view.state.moved_by(&step);
+        }
+        view.state.betas = *betas;
+    }
+}
+
+/// Betas, in standard deviations, beyond which the fit has gone wrong rather than met somebody rare.
+const MOST_UNUSUAL: f32 = 4.0;
 /// Keeps steps inside the region where matches still mean something.
 const RELATIVE_DAMPING: f64 = 1e-2;
 

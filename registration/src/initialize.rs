@@ -8,8 +8,8 @@ use crate::{
     correspond::Visibility,
     observe::Observation,
     smpl::JOINT_COUNT,
-    state::{BETA_COUNT, BodyState},
-    surface::{PosedSurface, ShapedSurface, Surface},
+    state::BodyState,
+    surface::{PosedSurface, ShapedSurface},
 };
 
 /// How widely to search.
@@ -72,13 +72,14 @@ impl Searcher<'_> {
             every: 2,
             drawn_visibility: true,
             widen: 1.5,
+            settled_from: 0.5,
         };
         let mut found = self.refine(&states(&found), self.fine, sight.fine, &last);
         keep_different(&mut found, self.config.finalists);
         found
     }
 
-    fn refine(
+    pub(crate) fn refine(
         &self,
         starts: &[BodyState],
         shaped: &ShapedSurface,
@@ -139,29 +140,8 @@ impl Searcher<'_> {
     }
 }
 
-/// Betas that make the body as tall as the person seems: the least unusual ones.
-pub(crate) fn betas_for_height(
-    surface: &std::sync::Arc<Surface>,
-    height_m: f32,
-) -> [f32; BETA_COUNT] {
-    /// Beyond three standard deviations it is not a height but a pose.
-    const MOST_UNUSUAL: f32 = 3.0;
-    let height_of = |betas: [f32; BETA_COUNT]| {
-        ShapedSurface::new(std::sync::Arc::clone(surface), betas).height_m()
-    };
-    let mean_m = height_of([0.0; BETA_COUNT]);
-    let slopes: [f32; BETA_COUNT] = std::array::from_fn(|k| {
-        let mut betas = [0.0; BETA_COUNT];
-        betas[k] = 1.0;
-        height_of(betas) - mean_m
-    });
-    let squared: f32 = slopes.iter().map(|s| s * s).sum();
-    // The prior's share: a height seen through shoes and hair, in whatever stance, is good to some 4 cm.
-    let gain = (height_m - mean_m) / (squared + 0.04 * 0.04);
-    slopes.map(|slope| (gain * slope).clamp(-MOST_UNUSUAL, MOST_UNUSUAL))
-}
-
-const COARSE: Effort = Effort { rounds: 2, every: 1, drawn_visibility: false, widen: 3.0 };
+pub(crate) const COARSE: Effort =
+    Effort { rounds: 2, every: 1, drawn_visibility: false, widen: 3.0, settled_from: 1.0 };
 
 struct Template {
     joints: &'static [(usize, [f32; 3])],

@@ -15,6 +15,7 @@ mod fit;
 mod initialize;
 mod observe;
 mod prior;
+mod recover;
 mod residual;
 mod solve;
 mod state;

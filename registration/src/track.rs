@@ -9,9 +9,10 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     align::{Aligned, Context, Effort, EnergyConfig, align},
-    fit::{FitConfig, Moment, ShapeFit},
-    initialize::{InitializeConfig, Searcher, Sight, betas_for_height},
+    fit::{FitConfig, Moment, ShapeFit, fit_one},
+    initialize::{InitializeConfig, Searcher, Sight},
     observe::{Extent, Observation, ObserveConfig},
+    recover::recover_arms,
     registered::{RegisteredFrame, Tracking},
     smpl::{BodyModel, JOINT_COUNT},
     state::{BETA_COUNT, BodyState, axis_angle},
@@ -42,6 +43,10 @@ pub struct TrackConfig {
     pub patience_secs: f32,
     /// Pause between searches that fail.
     pub search_every_secs: f32,
+    /// More depth points than this share without body near them: a limb is astray.
+    pub stray_share: f32,
+    /// Pause between attempts to bring a limb back.
+    pub recover_every_secs: f32,
     /// Two headings are followed side by side for this long, until the picture has decided.
     pub undecided_secs: f32,
     pub energy: EnergyConfig,
@@ -56,12 +61,14 @@ impl Default for TrackConfig {
             search_vertices: 600,
             points: 1600,
             search_points: 260,
-            rounds: 5,
+            rounds: 7,
             min_person_px: 1000,
             bad_error_m: 0.055,
             found_error_m: 0.05,
             patience_secs: 0.2,
             search_every_secs: 0.15,
+            stray_share: 0.02,
+            recover_every_secs: 0.1,
             undecided_secs: 0.5,
             energy: EnergyConfig::default(),
             search: InitializeConfig::default(),
@@ -103,6 +110,7 @@ struct Following {
     since: Timestamp,
     last: Timestamp,
     bad_since: Option<Timestamp>,
+    last_recovery: Option<Timestamp>,
 }
 
 /// One body being followed.
@@ -241,11 +249,22 @@ impl Tracker {
             })
             .collect();
         let best = following.decide(now, self.config.undecided_secs);
-        let found = &aligned[best];
+        let mut found = aligned[best].clone();
+        if following.wants_recovery(&found, now, &self.config)
+            && let Some(better) = self.recover(&found, observation, clean)
+        {
+            // Jumping there was no movement to carry on.
+            following.bodies[0].state = better.state;
+            following.bodies[0].before = None;
+            found = better;
+        }
         let bad = found.agreement.error_m > self.config.bad_error_m;
         self.diagnosis = format!(
-            "{:?} rounds {} {:?} bodies {}",
-            found.agreement,
+            "err {:.4} iou {:.3} expl {:.3} stray {:.3} rounds {} {:?} bodies {}",
+            found.agreement.error_m,
+            found.agreement.overlap,
+            found.agreement.explained,
+            found.stray,
             found.rounds,
             found.termination,
             following.bodies.len()
@@ -261,18 +280,36 @@ impl Tracker {
             };
             return self.search(clean, observation);
         }
-        let tracking = tracked(found);
+        let tracking = tracked(&found);
         self.learn_shape(&mut following, observation, now, !bad);
         self.phase = Phase::Following(following);
         tracking
+    }
+
+    /// Other places for limbs that left depth points behind.
+    fn recover(
+        &self,
+        present: &Aligned,
+        observation: &Observation,
+        clean: &CleanFrame,
+    ) -> Option<Aligned> {
+        let coarse = self.observe_coarsely(clean)?;
+        let search_shaped = self.search_shape();
+        let sight = Sight { coarse: &coarse, fine: observation };
+        recover_arms(&self.searcher(&search_shaped), &sight, present)
     }
 
     /// One body's next state.
     fn advance(&self, body: &mut Body, observation: &Observation, step_secs: f32) -> Aligned {
         let predicted = body.predict(step_secs);
         let context = self.context(Some(&predicted));
-        let effort =
-            Effort { rounds: self.config.rounds, every: 1, drawn_visibility: true, widen: 1.0 };
+        let effort = Effort {
+            rounds: self.config.rounds,
+            every: 1,
+            drawn_visibility: true,
+            widen: 2.0,
+            settled_from: 0.3,
+        };
         let aligned = align(&self.shaped, &predicted, observation, &context, &effort);
         body.before = Some(body.state);
         body.state = aligned.state;
@@ -318,8 +355,13 @@ impl Tracker {
             }
             // The new shape settles in on the frame it was made in, so that the next one starts from rest.
             let context = Context { energy: &self.config.energy, predicted: None, grounded };
-            let effort =
-                Effort { rounds: self.config.rounds, every: 2, drawn_visibility: true, widen: 1.0 };
+            let effort = Effort {
+                rounds: self.config.rounds,
+                every: 2,
+                drawn_visibility: true,
+                widen: 1.0,
+                settled_from: 0.3,
+            };
             let settled = align(&self.shaped, &body.state, observation, &context, &effort);
             if let Some(before) = &mut body.before {
                 before.trans += settled.state.trans - body.state.trans;
@@ -370,30 +412,73 @@ impl Tracker {
         observation: &Observation,
         hints: &[BodyState],
     ) -> Vec<Aligned> {
-        let coarse_config = ObserveConfig {
+        let Some(coarse) = self.observe_coarsely(clean) else {
+            return Vec::new();
+        };
+        let search_shaped = self.search_shape();
+        let searcher = self.searcher(&search_shaped);
+        let mut found = searcher.search(&Sight { coarse: &coarse, fine: observation }, hints);
+        if !self.shape_known {
+            self.guess_shape(&mut found, observation);
+        }
+        found
+    }
+
+    /// The first shape, from the first frame: height above all.
+    fn guess_shape(&mut self, found: &mut [Aligned], observation: &Observation) {
+        let Some(best) = found.first() else {
+            return;
+        };
+        let context = self.context(None);
+        let fitted = fit_one(
+            &self.surface,
+            observation,
+            &best.state,
+            &self.config.fit,
+            &context,
+        );
+        self.shaped = ShapedSurface::new(Arc::clone(&self.surface), fitted.betas);
+        let effort = Effort {
+            rounds: self.config.rounds,
+            every: 1,
+            drawn_visibility: true,
+            widen: 1.0,
+            settled_from: 0.3,
+        };
+        for aligned in found {
+            let mut start = aligned.state;
+            start.betas = fitted.betas;
+            *aligned = align(
+                &self.shaped,
+                &start,
+                observation,
+                &self.context(None),
+                &effort,
+            );
+        }
+    }
+
+    fn observe_coarsely(&self, clean: &CleanFrame) -> Option<Observation> {
+        let config = ObserveConfig {
             points: self.config.search_points,
             cell_m: 0.03,
             min_px: self.config.min_person_px,
         };
-        let world_from_camera = self.world.world_from_camera();
-        let coarse = Observation::new(clean, &self.camera, world_from_camera, &coarse_config);
-        let Some(coarse) = coarse else {
-            return Vec::new();
-        };
-        if !self.shape_known && self.world.is_grounded() {
-            let betas = betas_for_height(&self.search_surface, observation.extent.high_y);
-            self.shaped = ShapedSurface::new(Arc::clone(&self.surface), betas);
-        }
-        let betas = self.shaped.betas;
-        let search_shaped = ShapedSurface::new(Arc::clone(&self.search_surface), betas);
-        let searcher = Searcher {
-            coarse: &search_shaped,
+        Observation::new(clean, &self.camera, self.world.world_from_camera(), &config)
+    }
+
+    fn search_shape(&self) -> ShapedSurface {
+        ShapedSurface::new(Arc::clone(&self.search_surface), self.shaped.betas)
+    }
+
+    fn searcher<'a>(&'a self, coarse: &'a ShapedSurface) -> Searcher<'a> {
+        Searcher {
+            coarse,
             fine: &self.shaped,
             energy: &self.config.energy,
             grounded: self.world.is_grounded(),
             config: &self.config.search,
-        };
-        searcher.search(&Sight { coarse: &coarse, fine: observation }, hints)
+        }
     }
 
     fn lose(&mut self, now: Timestamp) -> Tracking {
@@ -442,7 +527,19 @@ impl Following {
             turn > OTHER_WAY_RAD && other.agreement.error_m < RIVAL * best.agreement.error_m
         });
         let bodies = std::iter::once(best).chain(rival).map(Body::new).collect();
-        Self { bodies, since: now, last: now, bad_since: None }
+        Self { bodies, since: now, last: now, bad_since: None, last_recovery: None }
+    }
+
+    /// Whether a limb seems astray; not asked again too soon.
+    fn wants_recovery(&mut self, found: &Aligned, now: Timestamp, config: &TrackConfig) -> bool {
+        let rested = self
+            .last_recovery
+            .is_none_or(|last| (now - last) as f32 >= config.recover_every_secs);
+        let wanted = rested && found.stray > config.stray_share;
+        if wanted {
+            self.last_recovery = Some(now);
+        }
+        wanted
     }
 
     /// Lets the body that has agreed best so far speak, and ends the rivalry when it is time; returns where the
@@ -477,6 +574,8 @@ impl Body {
     fn predict(&self, step_secs: f32) -> BodyState {
         /// Accelerations are common; a velocity carried on in full overshoots.
         const CARRY: f32 = 0.8;
+        /// A quick wave; faster is an error that must not feed itself.
+        const FASTEST_RAD_PER_SEC: f32 = 8.0;
         let Some(before) = &self.before else {
             return self.state;
         };
@@ -491,9 +590,10 @@ impl Body {
         for joint in 0..JOINT_COUNT {
             let turn = self.state.rotations[joint] * before.rotations[joint].inverse();
             let trusted = carry * self.confidence[joint];
-            predicted.rotations[joint] = (Quat::from_scaled_axis(axis_angle(turn) * trusted)
-                * self.state.rotations[joint])
-                .normalize();
+            let turn =
+                (axis_angle(turn) * trusted).clamp_length_max(FASTEST_RAD_PER_SEC * step_secs);
+            predicted.rotations[joint] =
+                (Quat::from_scaled_axis(turn) * self.state.rotations[joint]).normalize();
         }
         predicted
     }

@@ -11,6 +11,7 @@ const FLOOR_FRAMES: usize = 15;
 #[derive(Clone, Debug)]
 pub(crate) struct World {
     world_from_camera: Rigid3,
+    known: Option<Rigid3>,
     floors: Vec<FloorPlane>,
     /// Whether y = 0 is known to be the floor.
     grounded: bool,
@@ -25,6 +26,7 @@ impl World {
         };
         Self {
             world_from_camera: known.unwrap_or(straight_ahead),
+            known,
             floors: Vec::new(),
             grounded: known.is_some(),
         }
@@ -46,7 +48,11 @@ impl World {
         }
         self.floors.push(*floor);
         let before = self.world_from_camera;
-        self.world_from_camera = from_floor(&median(&self.floors));
+        let floor = median(&self.floors);
+        self.world_from_camera = match self.known {
+            Some(known) => levelled(known, &floor),
+            None => from_floor(&floor),
+        };
         self.grounded = true;
         Some(self.world_from_camera * before.inverse())
     }
@@ -74,6 +80,14 @@ fn median(floors: &[FloorPlane]) -> FloorPlane {
         middle(&|f| f.normal.z),
     );
     FloorPlane { normal: normal.normalize_or(-Vec3::Y), offset_m: middle(&|f| f.offset_m) }
+}
+
+/// A known world, turned and lifted as little as it takes to have the floor at y = 0.
+fn levelled(known: Rigid3, floor: &FloorPlane) -> Rigid3 {
+    let up = known.rotate(floor.normal).normalize_or(Vec3::Y);
+    let rotation = (Quat::from_rotation_arc(up, Vec3::Y) * known.rotation).normalize();
+    let Vec3 { x, z, .. } = known.translation;
+    Rigid3 { rotation, translation: Vec3::new(x, -floor.offset_m, z) }
 }
 
 /// The world whose floor is the plane: `normal . p = offset` becomes y = 0.
@@ -107,6 +121,19 @@ mod tests {
         assert!((found.translation - truth.translation).length() < 1e-5);
         assert!(found.rotation.angle_between(truth.rotation) < 1e-3);
         assert!(world.is_grounded());
+    }
+
+    #[test]
+    fn a_known_camera_keeps_its_place_and_heading_when_the_floor_corrects_it() {
+        let heading = Quat::from_rotation_y(0.7) * Quat::from_rotation_x(std::f32::consts::PI);
+        let known = Rigid3 { rotation: heading, translation: Vec3::new(1.0, 1.3, 2.0) };
+        let floor = FloorPlane { normal: Vec3::new(0.0, -0.995, 0.0998), offset_m: -1.25 };
+        let mut world = World::new(Some(known));
+        world.observe(Some(&floor));
+        let found = world.world_from_camera();
+        assert!((found.translation - Vec3::new(1.0, 1.25, 2.0)).length() < 1e-5);
+        assert!(found.rotation.angle_between(heading) < 0.11);
+        assert!((found.rotate(floor.normal) - Vec3::Y).length() < 1e-3);
     }
 
     #[test]

@@ -6,7 +6,9 @@ use std::sync::Arc;
 use effigy_capture::FrameSource as _;
 use effigy_fusion::clean::{CleanConfig, Cleaner};
 use effigy_registration::{
-    BodyModel, RegisteredFrame, TrackConfig, Tracker, Tracking, motion::Routine, smpl::builtin,
+    BodyModel, RegisteredFrame, TrackConfig, Tracker, Tracking,
+    motion::Routine,
+    smpl::{JOINT_NAMES, builtin},
 };
 use effigy_sim_sensor::{GroundTruth, MotionChoice, OutfitKind, Scenario, SimulatedSensor, Truth};
 use glam::Vec3;
@@ -23,7 +25,7 @@ fn main() {
     let seed: u64 = argument(3, "1").parse().expect("seed is a number");
     let pictures = arguments.get(4).cloned();
     println!(
-        "{:<14} {:<8} {:>5} {:>6} {:>6} {:>6} {:>6} {:>6} {:>6} {:>6} {:>6} {:>6} {:>7} {:>7} {:>7}",
+        "{:<14} {:<8} {:>5} {:>6} {:>6} {:>6} {:>6} {:>6} {:>6} {:>6} {:>6} {:>6} {:>7} {:>7} {:>7} {:>7}",
         "motion",
         "outfit",
         "track",
@@ -36,6 +38,7 @@ fn main() {
         "hands",
         "feet",
         "resid",
+        "cpu avg",
         "ms p50",
         "ms p95",
         "ms max"
@@ -69,6 +72,9 @@ struct Row {
     feet: Vec<f32>,
     residual: Vec<f32>,
     milliseconds: Vec<f32>,
+    /// Summed differences found minus true, world axes, mm.
+    joint_errors: [Vec3; 24],
+    cpu_ms: f32,
 }
 
 #[expect(clippy::disallowed_methods, reason = "this example measures time")]
@@ -78,18 +84,23 @@ fn run(scenario: &Scenario, motion: &str, outfit: &str, pictures: Option<&str>) 
     let truth = Truth::new(scenario, Arc::clone(&body)).expect("a valid scenario");
     let calibration = sensor.calibration().clone();
     let mut cleaner = Cleaner::new(calibration.clone(), CleanConfig::default());
-    let mut tracker = Tracker::new(
-        Arc::clone(&body),
-        calibration.depth,
-        TrackConfig::default(),
-        None,
-    );
+    // Settings to try, as JSON: CONFIG='{"rounds": 5}'.
+    let config: TrackConfig = std::env::var("CONFIG")
+        .map(|json| serde_json::from_str(&json).expect("settings"))
+        .unwrap_or_default();
+    let mut tracker = Tracker::new(Arc::clone(&body), calibration.depth, config, None);
     let verbose = std::env::var("VERBOSE").is_ok();
+    let every: u64 = std::env::var("EVERY")
+        .ok()
+        .and_then(|n| n.parse().ok())
+        .unwrap_or(15);
     let mut row = Row::default();
     while let Some(frame) = sensor.next_frame().expect("the simulator delivers") {
         let clean = Arc::new(cleaner.process(&frame).expect("sizes agree"));
         let start = std::time::Instant::now();
+        let cpu_start = cpu_ms();
         let registered = tracker.process(Arc::clone(&clean));
+        row.cpu_ms += cpu_ms() - cpu_start;
         let ms = start.elapsed().as_secs_f32() * 1e3;
         let at = truth.at(frame.id);
         row.frames += 1;
@@ -99,10 +110,19 @@ fn run(scenario: &Scenario, motion: &str, outfit: &str, pictures: Option<&str>) 
             describe(&registered, &row, frame.id.0, &tracker);
         }
         if let Some(folder) = pictures
-            && frame.id.0 % 15 == 0
+            && frame.id.0.is_multiple_of(every)
         {
             let name = format!("{folder}/{motion}_{outfit}_{:04}.png", frame.id.0);
             draw(&body, &registered, &calibration.depth.intrinsics, &name);
+        }
+    }
+    if std::env::var("JOINTS").is_ok() {
+        for (joint, sum) in row.joint_errors.iter().enumerate() {
+            let mean = *sum / row.v2v.len().max(1) as f32;
+            println!(
+                "    {:<16} {:6.1} {:6.1} {:6.1} mm",
+                JOINT_NAMES[joint], mean.x, mean.y, mean.z
+            );
         }
     }
     row.print(motion, outfit);
@@ -158,6 +178,10 @@ impl Row {
             .push(mean(&fitted.vertices, &truth.minimal.vertices, &all));
         let joints = |which: &[usize]| mean(&fitted.joints, &truth.minimal.joints, which);
         self.mpjpe.push(joints(&(0..24).collect::<Vec<_>>()));
+        for joint in 0..24 {
+            self.joint_errors[joint] +=
+                (to_truth * fitted.joints[joint] - truth.minimal.joints[joint]) * 1e3;
+        }
         self.head.push(joints(&[15]));
         self.hands.push(joints(&[20, 21]));
         self.feet.push(joints(&[7, 8]));
@@ -170,7 +194,7 @@ impl Row {
         let last = mean(&self.v2v[self.v2v.len() / 2..]);
         let mut v2v = self.v2v.clone();
         println!(
-            "{motion:<14} {outfit:<8} {tracked:5.0} {:6.1} {:6.1} {:6.1} {:6.1} {last:6.1} {:6.1} {:6.1} {:6.1} {:6.1} {:7.1} {:7.1} {:7.1}",
+            "{motion:<14} {outfit:<8} {tracked:5.0} {:6.1} {:6.1} {:6.1} {:6.1} {last:6.1} {:6.1} {:6.1} {:6.1} {:6.1} {:7.1} {:7.1} {:7.1} {:7.1}",
             mean(&self.mpjpe),
             mean(&self.v2v),
             percentile(&mut v2v, 0.95),
@@ -179,11 +203,23 @@ impl Row {
             mean(&self.hands),
             mean(&self.feet),
             mean(&self.residual),
+            self.cpu_ms / self.frames as f32,
             percentile(&mut self.milliseconds, 0.5),
             percentile(&mut self.milliseconds, 0.95),
             percentile(&mut self.milliseconds, 1.0),
         );
     }
+}
+
+/// Time this thread has had the processor, as Linux counts it.
+fn cpu_ms() -> f32 {
+    let text = std::fs::read_to_string("/proc/thread-self/schedstat").unwrap_or_default();
+    let nanoseconds: f64 = text
+        .split(' ')
+        .next()
+        .and_then(|n| n.parse().ok())
+        .unwrap_or(0.0);
+    (nanoseconds * 1e-6) as f32
 }
 
 fn percentile(values: &mut [f32], share: f32) -> f32 {

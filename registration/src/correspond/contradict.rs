@@ -46,6 +46,9 @@ pub(crate) fn contradictions(
             }
             continue;
         }
+        if cell.seen == Seen::Gap {
+            continue;
+        }
         if cell.seen == Seen::Other && cell.depth_m < in_camera.z - OCCLUDER_M {
             continue;
         }

@@ -2,6 +2,8 @@
 
 use glam::{IVec3, Vec3};
 
+use super::MatchConfig;
+
 /// Points sorted into cubic cells.
 #[derive(Clone, Debug, Default)]
 pub(super) struct OrientedGrid {
@@ -58,14 +60,14 @@ impl OrientedGrid {
     }
 
     /// The point that minimises `|p - x|^2 + direction_m^2 |n - m|^2` within `reach_m` of a place, and that
-    /// squared measure. Points whose normals differ by more than a right angle do not count.
+    /// squared measure. Points whose normals have a cosine of `oblique` or less do not count.
     pub(super) fn nearest(
         &self,
         position: Vec3,
         normal: Vec3,
-        direction_m: f32,
-        reach_m: f32,
+        config: &MatchConfig,
     ) -> Option<(u32, f32)> {
+        let MatchConfig { reach_m, direction_m, oblique } = *config;
         if self.entries.is_empty() {
             return None;
         }
@@ -81,7 +83,7 @@ impl OrientedGrid {
             }
             self.for_each_in_ring(home, ring, |entry| {
                 let facing = entry.normal.dot(normal);
-                if facing <= 0.0 {
+                if facing <= oblique {
                     return;
                 }
                 let measure = entry.position.distance_squared(position)
@@ -172,6 +174,7 @@ mod tests {
             .map(|_| Vec3::new(random(), random(), random()).normalize_or(Vec3::X))
             .collect();
         let grid = OrientedGrid::new(&positions, &normals, 0..500, 0.06);
+        let config = MatchConfig { reach_m: 0.2, direction_m: 0.1, oblique: 0.0 };
         for _ in 0..300 {
             let place = Vec3::new(random(), 2.0 * random(), random()) * 1.2;
             let normal = Vec3::new(random(), random(), random()).normalize_or(Vec3::Y);
@@ -184,7 +187,7 @@ mod tests {
                 })
                 .min_by(|a, b| a.1.total_cmp(&b.1))
                 .filter(|(_, measure)| *measure < 0.04);
-            let found = grid.nearest(place, normal, 0.1, 0.2);
+            let found = grid.nearest(place, normal, &config);
             assert_eq!(found.map(|f| f.0), exact.map(|e| e.0), "at {place}");
         }
     }

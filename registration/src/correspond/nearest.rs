@@ -9,6 +9,8 @@ pub(crate) struct MatchConfig {
     pub(crate) reach_m: f32,
     /// A difference of normals of one radian counts like this much distance.
     pub(crate) direction_m: f32,
+    /// Normals whose cosine is this or less belong to different surfaces.
+    pub(crate) oblique: f32,
 }
 
 /// Side of a grid cell: about twice the spacing of the surface's vertices.
@@ -26,12 +28,7 @@ pub(crate) fn match_points(
     let visible = (0..body.vertices.len() as u32).filter(|&v| visibility.is_visible(v));
     let grid = OrientedGrid::new(&body.vertices, &body.normals, visible, CELL_M);
     for point in points {
-        let found = grid.nearest(
-            point.position,
-            point.normal,
-            config.direction_m,
-            config.reach_m,
-        );
+        let found = grid.nearest(point.position, point.normal, config);
         let Some((vertex, _)) = found else {
             continue;
         };
@@ -44,7 +41,8 @@ pub(crate) fn match_points(
             point: point.position,
             normal,
             sigma_m: point.sigma_m,
-            trust: point.normal.dot(body_normal).clamp(0.0, 1.0),
+            trust: ((point.normal.dot(body_normal) - config.oblique) / (1.0 - config.oblique))
+                .min(1.0),
         });
     }
 }

@@ -133,7 +133,7 @@ struct Tally {
 impl Tally {
     fn add(&mut self, seen: Seen, depth_m: f32, drawn_m: f32) {
         let drawn = drawn_m > 0.0;
-        let hidden = seen == Seen::Other && depth_m < drawn_m - OCCLUDER_M;
+        let hidden = seen == Seen::Gap || (seen == Seen::Other && depth_m < drawn_m - OCCLUDER_M);
         match (seen == Seen::Person, drawn) {
             (true, true) => {
                 let difference_m = (depth_m - drawn_m).abs();

@@ -32,10 +32,15 @@ pub(crate) struct Cell {
 pub(crate) enum Seen {
     #[default]
     Nothing,
+    /// Nothing measured in a hole or crack of the person: cleaning drops what is seen at a grazing angle, so the
+    /// body may well be there.
+    Gap,
     Other,
     Person,
 }
 
+/// Cracks narrower than twice this may hide a limb.
+const GAP_M: f32 = 0.05;
 /// Room around the person.
 const MARGIN_M: f32 = 0.25;
 
@@ -81,12 +86,14 @@ impl View {
         view.fill(clean, person.pixels_with_margin(clean, margin_px), scale);
         let inside: Vec<bool> = view.cells.iter().map(|c| c.seen == Seen::Person).collect();
         view.nearest_person = nearest_inside(&inside, pinhole.width as usize);
+        view.mark_gaps(cell_m);
         Some(view)
     }
 
     /// The cell a point in camera space falls into; `None` outside the view.
     pub(crate) fn cell_of(&self, in_camera: Vec3) -> Option<usize> {
-        if in_camera.z <= 0.05 {
+        // NaN is nowhere either.
+        if in_camera.z.is_nan() || in_camera.z <= 0.05 {
             return None;
         }
         let at = self.pinhole.project(in_camera) + 0.5;
@@ -121,21 +128,46 @@ impl View {
         for y in (top..bottom).step_by(step) {
             for x in (left..right).step_by(step) {
                 let i = y * clean.vertices.width + x;
-                let point = clean.vertices.points[i];
-                if !point.is_finite() {
-                    continue;
+                if clean.person[i] {
+                    let point = clean.vertices.points[i];
+                    if let Some(cell) = self.cell_of(point) {
+                        self.cells[cell].add(Seen::Person, point.z);
+                    }
+                } else if clean.depth.metres[i] > 0.05
+                    && let Some(cell) = self.cell_of_pixel(x, y, scale)
+                {
+                    // Surroundings only matter where they hide the person: a lens' distortion does not.
+                    self.cells[cell].add(Seen::Other, clean.depth.metres[i]);
                 }
-                let Some(cell) = self.cell_of(point) else {
-                    continue;
-                };
-                let seen = if clean.person[i] {
-                    Seen::Person
-                } else {
-                    Seen::Other
-                };
-                self.cells[cell].add(seen, point.z);
             }
         }
+    }
+
+    /// Closes the mask: empty cells that a disc of [`GAP_M`] outside the person cannot reach are gaps.
+    fn mark_gaps(&mut self, cell_m: f32) {
+        let radius = (GAP_M / cell_m).max(1.0);
+        let width = self.pinhole.width as usize;
+        let far = |nearest: &[[i16; 2]], i: usize| {
+            let [x, y] = nearest[i].map(f32::from);
+            Vec2::new(x - (i % width) as f32, y - (i / width) as f32).length() > radius
+        };
+        let outside: Vec<bool> = (0..self.cells.len())
+            .map(|i| far(&self.nearest_person, i))
+            .collect();
+        let nearest_outside = nearest_inside(&outside, width);
+        for i in 0..self.cells.len() {
+            if self.cells[i].seen == Seen::Nothing && far(&nearest_outside, i) {
+                self.cells[i].seen = Seen::Gap;
+            }
+        }
+    }
+
+    fn cell_of_pixel(&self, x: usize, y: usize, scale: f32) -> Option<usize> {
+        let place = |pixel: usize, start: i32| ((pixel as f32 + 0.5) / scale) as i32 + start;
+        let (x, y) = (place(x, self.image[0]), place(y, self.image[1]));
+        let (width, height) = (self.pinhole.width as i32, self.pinhole.height as i32);
+        let inside = x >= 0 && y >= 0 && x < width && y < height;
+        inside.then(|| (y * width + x) as usize)
     }
 
     #[cfg(test)]

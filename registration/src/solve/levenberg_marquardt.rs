@@ -44,8 +44,8 @@ impl Default for Damping {
 
 impl Termination {
     /// Whether another step from here can be worth its time.
-    pub(crate) fn may_go_on(self) -> bool {
-        matches!(self, Self::Descended { .. })
+    pub(crate) fn may_go_on(self, smallest_descent: f64) -> bool {
+        matches!(self, Self::Descended { by } if by >= smallest_descent)
     }
 }
 
