@@ -9,6 +9,7 @@ use crate::{
         Agreement, Contradictions, MatchConfig, Renderer, Visibility, contradictions, match_points,
     },
     observe::{DataPoint, Observation},
+    prior::surprise,
     residual::{
         ClothSide, DepthPush, FloorTerm, JointLimits, Match, PointToPlane, PosePrior, Silhouette,
         Temporal, Term,
@@ -86,6 +87,8 @@ pub(crate) struct Context<'a> {
     pub(crate) energy: &'a EnergyConfig,
     pub(crate) predicted: Option<&'a BodyState>,
     pub(crate) grounded: bool,
+    /// Whether all of the body should be in the mask: not where it is cut off.
+    pub(crate) whole: bool,
 }
 
 /// How long to try, and how carefully to look.
@@ -117,6 +120,23 @@ pub(crate) struct Aligned {
     pub(crate) joint_confidence: [f32; JOINT_COUNT],
     pub(crate) termination: Termination,
     pub(crate) rounds: usize,
+}
+
+impl Aligned {
+    /// How well this body explains the picture, less being better: the drawing's error, points left behind, and
+    /// how unusual the pose is, so weighted that between two bodies that look alike the ordinary one wins.
+    pub(crate) fn score_m(&self) -> f32 {
+        const STRAY_M: f32 = 0.05;
+        const SURPRISE_M: f32 = 2e-4;
+        self.agreement.error_m + STRAY_M * self.stray + SURPRISE_M * surprise(&self.state)
+    }
+
+    /// Whether enough is seen to call it a body: an end above the shoulders and a leg down to the knee.
+    pub(crate) fn shows_whole_body(&self) -> bool {
+        const SEEN: f32 = 0.3;
+        let any = |joints: &[usize]| joints.iter().any(|&j| self.joint_confidence[j] > SEEN);
+        any(&[12, 15]) && any(&[4, 5])
+    }
 }
 
 /// Everything that a round's terms borrow.
@@ -194,7 +214,7 @@ impl Evidence {
             oblique: energy.oblique,
         };
         self.point_count = points.len();
-        match_points(points, body, visibility, &matching, &mut self.matches);
+        match_points(points, body, visibility, matching, &mut self.matches);
         let slack_cells = slack_cells(observation, energy);
         contradictions(
             body,
@@ -220,9 +240,9 @@ impl Evidence {
         let data = PointToPlane {
             matches: &self.matches,
             cloth: ClothSide {
-                outside_m: energy.cloth_outside_m,
-                inside_m: energy.cloth_inside_m,
-                outlier_m: energy.outlier_m * widen,
+                outside: energy.cloth_outside_m,
+                inside: energy.cloth_inside_m,
+                outlier: energy.outlier_m * widen,
             },
             standoff_m: energy.cloth_standoff_m,
             weight: energy.data_weight / self.point_count.max(1) as f32,
@@ -255,7 +275,10 @@ impl Evidence {
             trans_sigma_m: energy.temporal_trans_m,
             weight: energy.temporal_weight,
         });
-        let mut terms: Vec<&dyn Term> = vec![&data, &silhouette, &push, &prior, &limits];
+        let mut terms: Vec<&dyn Term> = vec![&data, &push, &prior, &limits];
+        if context.whole {
+            terms.push(&silhouette);
+        }
         if context.grounded {
             terms.push(&floor);
         }

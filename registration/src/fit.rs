@@ -114,7 +114,7 @@ impl ShapeFit {
             }
             return None;
         }
-        let context = Context { energy, predicted: None, grounded };
+        let context = Context { energy, predicted: None, grounded, whole: true };
         self.round(config, &context);
         let running = self.running.as_ref()?;
         if running.rounds_done < config.rounds {
@@ -200,7 +200,7 @@ fn round(
     config: &FitConfig,
     context: &Context<'_>,
 ) {
-    let shaped = ShapedSurface::new(Arc::clone(surface), *betas);
+    let shaped = ShapedSurface::new(surface, *betas);
     let mut sum = NormalEquations::new(BETA_COUNT);
     let mut eliminated = Vec::with_capacity(views.len());
     for view in views.iter() {

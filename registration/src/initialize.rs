@@ -7,13 +7,14 @@ use crate::{
     align::{Aligned, Context, Effort, EnergyConfig, align},
     correspond::Visibility,
     observe::Observation,
+    prior::JOINT_PRIORS,
     smpl::JOINT_COUNT,
     state::BodyState,
     surface::{PosedSurface, ShapedSurface},
 };
 
 /// How widely to search.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct InitializeConfig {
     /// Headings tried, evenly around the compass.
@@ -75,6 +76,10 @@ impl Searcher<'_> {
             settled_from: 0.5,
         };
         let mut found = self.refine(&states(&found), self.fine, sight.fine, &last);
+        // A template's raised arm may have hidden behind the body: unseen limbs are as people hold them.
+        let relaxed: Vec<BodyState> = found.iter().filter_map(with_unseen_arms_at_rest).collect();
+        found.extend(self.refine(&relaxed, self.fine, sight.fine, &last));
+        found.sort_by(|a, b| a.score_m().total_cmp(&b.score_m()));
         keep_different(&mut found, self.config.finalists);
         found
     }
@@ -86,12 +91,13 @@ impl Searcher<'_> {
         observation: &Observation,
         effort: &Effort,
     ) -> Vec<Aligned> {
-        let context = Context { energy: self.energy, predicted: None, grounded: self.grounded };
+        let context =
+            Context { energy: self.energy, predicted: None, grounded: self.grounded, whole: true };
         let mut found: Vec<Aligned> = starts
             .iter()
             .map(|start| align(shaped, start, observation, &context, effort))
             .collect();
-        found.sort_by(|a, b| a.agreement.error_m.total_cmp(&b.agreement.error_m));
+        found.sort_by(|a, b| a.score_m().total_cmp(&b.score_m()));
         found
     }
 
@@ -174,6 +180,23 @@ const TEMPLATES: [Template; 7] = [
         ],
     },
 ];
+
+/// The body with each arm that nothing shows put where the prior has it; `None` if all is seen.
+fn with_unseen_arms_at_rest(found: &Aligned) -> Option<BodyState> {
+    /// Collar, shoulder, elbow, wrist.
+    const ARMS: [[usize; 4]; 2] = [[13, 16, 18, 20], [14, 17, 19, 21]];
+    const UNSEEN: f32 = 0.5;
+    let mut state = found.state;
+    for [collar, shoulder, elbow, wrist] in ARMS {
+        if found.joint_confidence[elbow] < UNSEEN && found.joint_confidence[wrist] < UNSEEN {
+            for joint in [collar, shoulder, elbow, wrist] {
+                state.rotations[joint] =
+                    Quat::from_scaled_axis(Vec3::from(JOINT_PRIORS[joint].mean));
+            }
+        }
+    }
+    (state != found.state).then_some(state)
+}
 
 fn states(found: &[Aligned]) -> Vec<BodyState> {
     found.iter().map(|aligned| aligned.state).collect()

@@ -6,7 +6,10 @@
 //! Means and spreads are rounded from everyday standing, walking and reaching; spines and collars share what one
 //! anatomical joint does, so each gets little.
 
-use crate::smpl::JOINT_COUNT;
+use crate::{
+    smpl::JOINT_COUNT,
+    state::{BodyState, axis_angle},
+};
 
 /// One joint's figures, in radians, by axis-angle component.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -92,6 +95,18 @@ const ELBOW: JointPrior = JointPrior {
     min: [-1.7, -2.8, -1.2],
     max: [1.7, 0.2, 1.2],
 };
+
+/// Half the squared distance of a pose from the means, in standard deviations: how unusual it is.
+pub(crate) fn surprise(state: &BodyState) -> f32 {
+    let mut sum = 0.0;
+    for (joint, prior) in JOINT_PRIORS.iter().enumerate().skip(1) {
+        let theta = axis_angle(state.rotations[joint]);
+        for axis in 0..3 {
+            sum += ((theta[axis] - prior.mean[axis]) / prior.sigma[axis]).powi(2);
+        }
+    }
+    0.5 * sum
+}
 
 const fn symmetric(sigma: [f32; 3], limit: [f32; 3]) -> JointPrior {
     JointPrior { mean: [0.0; 3], sigma, min: [-limit[0], -limit[1], -limit[2]], max: limit }

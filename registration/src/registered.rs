@@ -9,6 +9,10 @@ use crate::smpl::BodyParams;
 
 /// The state of the followed body at one frame.
 #[derive(Clone, Debug, PartialEq)]
+#[expect(
+    clippy::large_enum_variant,
+    reason = "almost every frame is tracked, and one exists a frame"
+)]
 pub enum Tracking {
     Tracked {
         params: BodyParams,

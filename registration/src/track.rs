@@ -90,10 +90,10 @@ pub struct Tracker {
     shape_known: bool,
     first_track: Option<Timestamp>,
     phase: Phase,
-    diagnosis: String,
 }
 
 #[derive(Clone, Debug)]
+#[expect(clippy::large_enum_variant, reason = "a tracker has one")]
 enum Phase {
     Searching {
         since: Option<Timestamp>,
@@ -109,6 +109,9 @@ struct Following {
     bodies: Vec<Body>,
     since: Timestamp,
     last: Timestamp,
+    /// Whether all of the body is in view now, and when it last was.
+    whole: bool,
+    last_whole: Timestamp,
     bad_since: Option<Timestamp>,
     last_recovery: Option<Timestamp>,
 }
@@ -138,14 +141,13 @@ impl Tracker {
         Self {
             camera,
             world: World::new(world_from_camera),
-            shaped: ShapedSurface::new(Arc::clone(&surface), betas),
+            shaped: ShapedSurface::new(&surface, betas),
             shape: ShapeFit::new(Arc::clone(&surface)),
             surface,
             search_surface,
             shape_known: false,
             first_track: None,
             phase: Phase::Searching { since: None, last_try: None, last_seen: None },
-            diagnosis: String::new(),
             config,
         }
     }
@@ -160,14 +162,9 @@ impl Tracker {
         self.shape.is_frozen(&self.config.fit)
     }
 
-    /// A line about the last frame, for people who look into tracking.
-    pub fn diagnosis(&self) -> String {
-        self.diagnosis.clone()
-    }
-
     /// Starts anew with another person; what is known of the floor stays.
     pub fn forget_person(&mut self) {
-        self.shaped = ShapedSurface::new(Arc::clone(&self.surface), [0.0; BETA_COUNT]);
+        self.shaped = ShapedSurface::new(&self.surface, [0.0; BETA_COUNT]);
         self.shape = ShapeFit::new(Arc::clone(&self.surface));
         self.shape_known = false;
         self.first_track = None;
@@ -188,18 +185,31 @@ impl Tracker {
         let Some(observation) = self.observe(clean) else {
             return self.lose(now);
         };
-        if self.is_cut_off(clean, &observation.extent) {
+        let cut_off = self.is_cut_off(clean, &observation.extent);
+        if cut_off && !self.bridges_cut(now) {
             let since = self.give_up_following(now);
             return Tracking::Partial { since };
         }
         match std::mem::replace(&mut self.phase, Phase::nowhere()) {
-            Phase::Following(following) => self.follow(following, &observation, clean),
+            Phase::Following(mut following) => {
+                following.whole = !cut_off;
+                self.follow(following, &observation, clean)
+            }
             Phase::Searching { since, last_try, last_seen } => {
                 let since = since.unwrap_or(now);
                 self.phase = Phase::Searching { since: Some(since), last_try, last_seen };
                 self.search(clean, &observation)
             }
         }
+    }
+
+    /// Whether a cut-off body is still followed: for a moment, its unseen limbs go on as they were.
+    fn bridges_cut(&mut self, now: Timestamp) -> bool {
+        let patience_secs = self.config.patience_secs;
+        let Phase::Following(following) = &mut self.phase else {
+            return false;
+        };
+        (now - following.last_whole) as f32 <= patience_secs
     }
 
     fn observe(&self, clean: &CleanFrame) -> Option<Observation> {
@@ -239,18 +249,23 @@ impl Tracker {
         let now = clean.timestamp;
         let step_secs = ((now - following.last) as f32).clamp(0.0, 1.0);
         following.last = now;
+        if following.whole {
+            following.last_whole = now;
+        }
+        let whole = following.whole;
         let aligned: Vec<Aligned> = following
             .bodies
             .iter_mut()
             .map(|body| {
-                let aligned = self.advance(body, observation, step_secs);
+                let aligned = self.advance(body, observation, step_secs, whole);
                 body.error_sum_m += aligned.agreement.error_m;
                 aligned
             })
             .collect();
         let best = following.decide(now, self.config.undecided_secs);
         let mut found = aligned[best].clone();
-        if following.wants_recovery(&found, now, &self.config)
+        if following.whole
+            && following.wants_recovery(&found, now, &self.config)
             && let Some(better) = self.recover(&found, observation, clean)
         {
             // Jumping there was no movement to carry on.
@@ -258,17 +273,16 @@ impl Tracker {
             following.bodies[0].before = None;
             found = better;
         }
-        let bad = found.agreement.error_m > self.config.bad_error_m;
-        self.diagnosis = format!(
-            "err {:.4} iou {:.3} expl {:.3} stray {:.3} rounds {} {:?} bodies {}",
-            found.agreement.error_m,
-            found.agreement.overlap,
-            found.agreement.explained,
-            found.stray,
-            found.rounds,
-            found.termination,
-            following.bodies.len()
+        tracing::trace!(
+            frame = clean.id.0,
+            rounds = found.rounds,
+            ended = ?found.termination,
+            error_m = found.agreement.error_m,
+            stray = found.stray,
+            "followed"
         );
+        let bad = whole
+            && (found.agreement.error_m > self.config.bad_error_m || !found.shows_whole_body());
         following.bad_since = bad.then(|| following.bad_since.unwrap_or(now));
         if let Some(since) = following.bad_since
             && (now - since) as f32 >= self.config.patience_secs
@@ -281,7 +295,8 @@ impl Tracker {
             return self.search(clean, observation);
         }
         let tracking = tracked(&found);
-        self.learn_shape(&mut following, observation, now, !bad);
+        let teaches = !bad && following.whole;
+        self.learn_shape(&mut following, observation, now, teaches);
         self.phase = Phase::Following(following);
         tracking
     }
@@ -300,9 +315,15 @@ impl Tracker {
     }
 
     /// One body's next state.
-    fn advance(&self, body: &mut Body, observation: &Observation, step_secs: f32) -> Aligned {
+    fn advance(
+        &self,
+        body: &mut Body,
+        observation: &Observation,
+        step_secs: f32,
+        whole: bool,
+    ) -> Aligned {
         let predicted = body.predict(step_secs);
-        let context = self.context(Some(&predicted));
+        let context = Context { whole, ..self.context(Some(&predicted)) };
         let effort = Effort {
             rounds: self.config.rounds,
             every: 1,
@@ -319,7 +340,12 @@ impl Tracker {
     }
 
     fn context<'a>(&'a self, predicted: Option<&'a BodyState>) -> Context<'a> {
-        Context { energy: &self.config.energy, predicted, grounded: self.world.is_grounded() }
+        Context {
+            energy: &self.config.energy,
+            predicted,
+            grounded: self.world.is_grounded(),
+            whole: true,
+        }
     }
 
     fn learn_shape(
@@ -346,7 +372,7 @@ impl Tracker {
             return;
         };
         let old_pelvis = self.shaped.rest_joints[0];
-        self.shaped = ShapedSurface::new(Arc::clone(&self.surface), betas);
+        self.shaped = ShapedSurface::new(&self.surface, betas);
         let shift = old_pelvis - self.shaped.rest_joints[0];
         for body in &mut following.bodies {
             for state in std::iter::once(&mut body.state).chain(body.before.as_mut()) {
@@ -354,7 +380,8 @@ impl Tracker {
                 state.trans += shift;
             }
             // The new shape settles in on the frame it was made in, so that the next one starts from rest.
-            let context = Context { energy: &self.config.energy, predicted: None, grounded };
+            let context =
+                Context { energy: &self.config.energy, predicted: None, grounded, whole: true };
             let effort = Effort {
                 rounds: self.config.rounds,
                 every: 2,
@@ -375,7 +402,8 @@ impl Tracker {
         let Phase::Searching { since, last_try, last_seen } = &mut self.phase else {
             return Tracking::Lost { since: now };
         };
-        let lost = Tracking::Lost { since: since.unwrap_or(now) };
+        let since_when = since.unwrap_or(now);
+        let lost = Tracking::Lost { since: since_when };
         let too_soon = last_try.is_some_and(|t| ((now - t) as f32) < self.config.search_every_secs);
         if too_soon {
             return lost;
@@ -386,18 +414,11 @@ impl Tracker {
         let Some(best) = found.first() else {
             return lost;
         };
-        self.diagnosis = format!(
-            "searched: {:?}",
-            found
-                .iter()
-                .map(|f| (
-                    f.agreement.error_m,
-                    f.state.rotations[0].to_euler(glam::EulerRot::YXZ).0
-                ))
-                .collect::<Vec<_>>()
-        );
         if best.agreement.error_m > self.config.found_error_m {
             return lost;
+        }
+        if !best.shows_whole_body() {
+            return Tracking::Partial { since: since_when };
         }
         let tracking = tracked(best);
         self.phase = Phase::Following(Following::new(&found, now));
@@ -437,7 +458,7 @@ impl Tracker {
             &self.config.fit,
             &context,
         );
-        self.shaped = ShapedSurface::new(Arc::clone(&self.surface), fitted.betas);
+        self.shaped = ShapedSurface::new(&self.surface, fitted.betas);
         let effort = Effort {
             rounds: self.config.rounds,
             every: 1,
@@ -445,7 +466,7 @@ impl Tracker {
             widen: 1.0,
             settled_from: 0.3,
         };
-        for aligned in found {
+        for aligned in found.iter_mut() {
             let mut start = aligned.state;
             start.betas = fitted.betas;
             *aligned = align(
@@ -456,6 +477,7 @@ impl Tracker {
                 &effort,
             );
         }
+        found.sort_by(|a, b| a.score_m().total_cmp(&b.score_m()));
     }
 
     fn observe_coarsely(&self, clean: &CleanFrame) -> Option<Observation> {
@@ -468,7 +490,7 @@ impl Tracker {
     }
 
     fn search_shape(&self) -> ShapedSurface {
-        ShapedSurface::new(Arc::clone(&self.search_surface), self.shaped.betas)
+        ShapedSurface::new(&self.search_surface, self.shaped.betas)
     }
 
     fn searcher<'a>(&'a self, coarse: &'a ShapedSurface) -> Searcher<'a> {
@@ -527,7 +549,15 @@ impl Following {
             turn > OTHER_WAY_RAD && other.agreement.error_m < RIVAL * best.agreement.error_m
         });
         let bodies = std::iter::once(best).chain(rival).map(Body::new).collect();
-        Self { bodies, since: now, last: now, bad_since: None, last_recovery: None }
+        Self {
+            bodies,
+            since: now,
+            last: now,
+            whole: true,
+            last_whole: now,
+            bad_since: None,
+            last_recovery: None,
+        }
     }
 
     /// Whether a limb seems astray; not asked again too soon.

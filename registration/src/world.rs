@@ -10,7 +10,7 @@ const FLOOR_FRAMES: usize = 15;
 /// Learns where the floor is from the first frames that show it.
 #[derive(Clone, Debug)]
 pub(crate) struct World {
-    world_from_camera: Rigid3,
+    present: Rigid3,
     known: Option<Rigid3>,
     floors: Vec<FloorPlane>,
     /// Whether y = 0 is known to be the floor.
@@ -25,7 +25,7 @@ impl World {
             translation: Vec3::ZERO,
         };
         Self {
-            world_from_camera: known.unwrap_or(straight_ahead),
+            present: known.unwrap_or(straight_ahead),
             known,
             floors: Vec::new(),
             grounded: known.is_some(),
@@ -33,7 +33,7 @@ impl World {
     }
 
     pub(crate) fn world_from_camera(&self) -> Rigid3 {
-        self.world_from_camera
+        self.present
     }
 
     pub(crate) fn is_grounded(&self) -> bool {
@@ -42,24 +42,24 @@ impl World {
 
     /// Takes one more frame's floor in; returns how the world moved, if it did.
     pub(crate) fn observe(&mut self, floor: Option<&FloorPlane>) -> Option<Rigid3> {
-        let floor = floor.filter(|floor| is_plausible(floor))?;
+        let floor = floor.copied().filter(|floor| is_plausible(*floor))?;
         if self.floors.len() >= FLOOR_FRAMES {
             return None;
         }
-        self.floors.push(*floor);
-        let before = self.world_from_camera;
+        self.floors.push(floor);
+        let before = self.present;
         let floor = median(&self.floors);
-        self.world_from_camera = match self.known {
-            Some(known) => levelled(known, &floor),
-            None => from_floor(&floor),
+        self.present = match self.known {
+            Some(known) => levelled(known, floor),
+            None => from_floor(floor),
         };
         self.grounded = true;
-        Some(self.world_from_camera * before.inverse())
+        Some(self.present * before.inverse())
     }
 }
 
 /// Up is up (camera y points down) to within 60 degrees, and the floor is below the camera.
-fn is_plausible(floor: &FloorPlane) -> bool {
+fn is_plausible(floor: FloorPlane) -> bool {
     floor.normal.is_finite()
         && (floor.normal.length() - 1.0).abs() < 1e-2
         && floor.normal.y < -0.5
@@ -83,7 +83,7 @@ fn median(floors: &[FloorPlane]) -> FloorPlane {
 }
 
 /// A known world, turned and lifted as little as it takes to have the floor at y = 0.
-fn levelled(known: Rigid3, floor: &FloorPlane) -> Rigid3 {
+fn levelled(known: Rigid3, floor: FloorPlane) -> Rigid3 {
     let up = known.rotate(floor.normal).normalize_or(Vec3::Y);
     let rotation = (Quat::from_rotation_arc(up, Vec3::Y) * known.rotation).normalize();
     let Vec3 { x, z, .. } = known.translation;
@@ -91,7 +91,7 @@ fn levelled(known: Rigid3, floor: &FloorPlane) -> Rigid3 {
 }
 
 /// The world whose floor is the plane: `normal . p = offset` becomes y = 0.
-fn from_floor(floor: &FloorPlane) -> Rigid3 {
+fn from_floor(floor: FloorPlane) -> Rigid3 {
     let up = floor.normal;
     let ahead = (Vec3::Z - up * up.z).normalize_or(Vec3::X);
     let back = -ahead;

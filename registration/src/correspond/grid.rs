@@ -65,9 +65,9 @@ impl OrientedGrid {
         &self,
         position: Vec3,
         normal: Vec3,
-        config: &MatchConfig,
+        config: MatchConfig,
     ) -> Option<(u32, f32)> {
-        let MatchConfig { reach_m, direction_m, oblique } = *config;
+        let MatchConfig { reach_m, direction_m, oblique } = config;
         if self.entries.is_empty() {
             return None;
         }
@@ -187,7 +187,7 @@ mod tests {
                 })
                 .min_by(|a, b| a.1.total_cmp(&b.1))
                 .filter(|(_, measure)| *measure < 0.04);
-            let found = grid.nearest(place, normal, &config);
+            let found = grid.nearest(place, normal, config);
             assert_eq!(found.map(|f| f.0), exact.map(|e| e.0), "at {place}");
         }
     }

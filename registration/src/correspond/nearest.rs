@@ -21,7 +21,7 @@ pub(crate) fn match_points(
     points: &[DataPoint],
     body: &PosedSurface<'_>,
     visibility: &Visibility,
-    config: &MatchConfig,
+    config: MatchConfig,
     matches: &mut Vec<Match>,
 ) {
     matches.clear();

@@ -57,11 +57,6 @@ impl Visibility {
             .collect();
         Self { visible }
     }
-
-    pub(crate) fn fraction(&self) -> f32 {
-        let count = self.visible.iter().filter(|&&v| v).count();
-        count as f32 / self.visible.len().max(1) as f32
-    }
 }
 
 impl Renderer {

@@ -21,7 +21,7 @@ pub(crate) fn test_surface() -> ShapedSurface {
     let mut surface = Surface::new(builtin::body(), 400);
     surface.pose_dirs.clear();
     ShapedSurface::new(
-        Arc::new(surface),
+        &Arc::new(surface),
         [0.3, -0.2, 0.1, 0.0, 0.2, 0.0, 0.0, 0.0, 0.0, -0.1],
     )
 }
@@ -42,13 +42,13 @@ pub(crate) fn test_state() -> BodyState {
 
 /// Fails the test if any residual's derivative is off in the test's pose.
 pub(crate) fn assert_derivatives(term: &dyn Term) {
-    assert_derivatives_at(term, test_state());
+    assert_derivatives_at(term, &test_state());
 }
 
 /// As [`assert_derivatives`], in another pose.
-pub(crate) fn assert_derivatives_at(term: &dyn Term, state: BodyState) {
+pub(crate) fn assert_derivatives_at(term: &dyn Term, state: &BodyState) {
     let shaped = test_surface();
-    let analytic = rows_at(term, &shaped, &state, true);
+    let analytic = rows_at(term, &shaped, state, true);
     assert!(
         !analytic.is_empty(),
         "the term emits nothing in the test's pose"
@@ -106,7 +106,7 @@ fn rows_at(
     state: &BodyState,
     derivatives: bool,
 ) -> Vec<DenseRow> {
-    let reshaped = ShapedSurface::new(Arc::clone(&shaped.surface), state.betas);
+    let reshaped = ShapedSurface::new(&shaped.surface, state.betas);
     let body = PosedSurface::new(&reshaped, state).with_shape_derivatives();
     let mut sink = DenseRows { rows: Vec::new(), derivatives };
     term.emit(&body, &mut sink);

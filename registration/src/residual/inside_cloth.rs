@@ -1,26 +1,26 @@
 //! The body stays inside the clothes: which side of the body a depth point is on decides what it costs.
 
-/// Scales of the distance from the body's surface to an observed point, along the surface's normal.
+/// Scales, in metres, of the distance from the body's surface to an observed point, along the surface's normal.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct ClothSide {
     /// A point outside the body by this much costs one: cloth may stand off.
-    pub(crate) outside_m: f32,
+    pub(crate) outside: f32,
     /// A point inside the body by this much costs one: cloth never does that.
-    pub(crate) inside_m: f32,
+    pub(crate) inside: f32,
     /// Beyond this the point belongs to something else (Geman-McClure).
-    pub(crate) outlier_m: f32,
+    pub(crate) outlier: f32,
 }
 
 impl ClothSide {
     /// Weight and robust cost of a signed distance (positive: outside the body), with the depth's own sigma.
-    pub(crate) fn weight_and_cost(&self, distance_m: f32, sigma_m: f32) -> (f32, f32) {
+    pub(crate) fn weight_and_cost(self, distance_m: f32, sigma_m: f32) -> (f32, f32) {
         let scale_m = if distance_m < 0.0 {
-            self.inside_m
+            self.inside
         } else {
-            self.outside_m
+            self.outside
         };
         let plain = 1.0 / (scale_m * scale_m + sigma_m * sigma_m);
-        let share = 1.0 / (1.0 + (distance_m / self.outlier_m).powi(2));
+        let share = 1.0 / (1.0 + (distance_m / self.outlier).powi(2));
         (
             plain * share * share,
             plain * share * distance_m * distance_m,
@@ -32,7 +32,7 @@ impl ClothSide {
 mod tests {
     use super::*;
 
-    const SIDE: ClothSide = ClothSide { outside_m: 0.02, inside_m: 0.006, outlier_m: 0.06 };
+    const SIDE: ClothSide = ClothSide { outside: 0.02, inside: 0.006, outlier: 0.06 };
 
     #[test]
     fn three_centimetres_of_cloth_cost_less_than_two_centimetres_of_skin_outside_it() {

@@ -5,7 +5,6 @@ use glam::{Mat3, Vec3};
 use super::{Row, RowSink, Term};
 use crate::{
     prior::JOINT_PRIORS,
-    smpl::JOINT_COUNT,
     state::{FIRST_JOINT, axis_angle, left_jacobian_inverse},
     surface::PosedSurface,
 };
@@ -20,9 +19,8 @@ impl Term for JointLimits {
     fn emit(&self, body: &PosedSurface<'_>, sink: &mut dyn RowSink) {
         let weight = 1.0 / (self.sigma_rad * self.sigma_rad);
         let mut row = Row::new(0.0, 0.0);
-        for joint in 1..JOINT_COUNT {
+        for (joint, limits) in JOINT_PRIORS.iter().enumerate().skip(1) {
             let theta = axis_angle(body.state.rotations[joint]);
-            let limits = &JOINT_PRIORS[joint];
             let beyond = theta - theta.clamp(Vec3::from(limits.min), Vec3::from(limits.max));
             if beyond == Vec3::ZERO {
                 continue;
@@ -48,7 +46,10 @@ mod tests {
     use glam::Quat;
 
     use super::*;
-    use crate::residual::{CostSum, checker};
+    use crate::{
+        residual::{CostSum, checker},
+        smpl::JOINT_COUNT,
+    };
 
     #[test]
     fn derivatives_agree_with_finite_differences() {
@@ -56,7 +57,7 @@ mod tests {
         state.rotations[4] = Quat::from_scaled_axis(Vec3::new(-0.5, 0.7, -0.1));
         state.rotations[5] = Quat::from_scaled_axis(Vec3::new(1.0, 0.1, 0.1));
         state.rotations[18] = Quat::from_scaled_axis(Vec3::new(0.3, 0.8, 0.2));
-        checker::assert_derivatives_at(&JointLimits { sigma_rad: 0.1 }, state);
+        checker::assert_derivatives_at(&JointLimits { sigma_rad: 0.1 }, &state);
     }
 
     #[test]

@@ -66,7 +66,7 @@ mod tests {
                 trust: 1.0,
             })
             .collect();
-        let cloth = ClothSide { outside_m: 0.02, inside_m: 0.008, outlier_m: 0.06 };
+        let cloth = ClothSide { outside: 0.02, inside: 0.008, outlier: 0.06 };
         checker::assert_derivatives(&PointToPlane {
             matches: &matches,
             cloth,

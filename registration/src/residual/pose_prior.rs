@@ -5,7 +5,6 @@ use glam::Vec3;
 use super::{Row, RowSink, Term, joint_limits::row_of};
 use crate::{
     prior::JOINT_PRIORS,
-    smpl::JOINT_COUNT,
     state::{FIRST_JOINT, axis_angle, left_jacobian_inverse},
     surface::PosedSurface,
 };
@@ -19,9 +18,8 @@ pub(crate) struct PosePrior {
 impl Term for PosePrior {
     fn emit(&self, body: &PosedSurface<'_>, sink: &mut dyn RowSink) {
         let mut row = Row::new(0.0, 0.0);
-        for joint in 1..JOINT_COUNT {
+        for (joint, prior) in JOINT_PRIORS.iter().enumerate().skip(1) {
             let theta = axis_angle(body.state.rotations[joint]);
-            let prior = &JOINT_PRIORS[joint];
             let slope = left_jacobian_inverse(theta);
             for axis in 0..3 {
                 let residual = (theta[axis] - prior.mean[axis]) / prior.sigma[axis];
@@ -39,7 +37,7 @@ impl Term for PosePrior {
 
 impl PosePrior {
     /// The pelvis' own up axis stays near the world's: residuals are its x and z.
-    fn emit_upright(&self, body: &PosedSurface<'_>, row: &mut Row, sink: &mut dyn RowSink) {
+    fn emit_upright(self, body: &PosedSurface<'_>, row: &mut Row, sink: &mut dyn RowSink) {
         /// People bend at the hips before they tilt the pelvis much further than this.
         const TILT_SIGMA_RAD: f32 = 0.4;
         let up = body.state.rotations[0] * Vec3::Y;

@@ -107,10 +107,10 @@ impl<'a> PosedSurface<'a> {
             let mask = influences.bone_masks[k];
             let mut arm = Vec3::ZERO;
             let mut weight = 0.0;
-            for slot in 0..4 {
+            for (slot, (point, share)) in carried.iter().zip(&weights.weights).enumerate() {
                 if mask & (1 << slot) != 0 {
-                    arm += carried[slot];
-                    weight += weights.weights[slot];
+                    arm += *point;
+                    weight += share;
                 }
             }
             // x moves by d x (arm - w p): along the direction, that is d . ((arm - w p) x direction).

@@ -21,7 +21,7 @@ pub(crate) struct ShapedSurface {
 }
 
 impl ShapedSurface {
-    pub(crate) fn new(surface: Arc<Surface>, betas: [f32; BETA_COUNT]) -> Self {
+    pub(crate) fn new(surface: &Arc<Surface>, betas: [f32; BETA_COUNT]) -> Self {
         let model = &surface.model;
         let whole = model.shaped_vertices(&betas);
         let rest_joints = model.joints(&whole);
@@ -41,18 +41,7 @@ impl ShapedSurface {
             normals: pick(&whole_normals),
             rest_joints,
             joint_dirs,
-            surface: Arc::clone(&surface),
+            surface: Arc::clone(surface),
         }
-    }
-
-    /// From the lowest to the highest vertex in the zero pose, metres.
-    pub(crate) fn height_m(&self) -> f32 {
-        let (low, high) = self
-            .vertices
-            .iter()
-            .fold((f32::MAX, f32::MIN), |(low, high), v| {
-                (low.min(v.y), high.max(v.y))
-            });
-        high - low
     }
 }

@@ -50,6 +50,9 @@ pub struct BodyConfig {
     pub max_fragment_share: f32,
     pub fragment_behind_m: f32,
     pub fragment_before_m: f32,
+    /// The same for the other half of a body cut by its own hand and a hem: above or below, and no farther apart.
+    pub max_half_share: f32,
+    pub half_apart_m: f32,
 }
 
 impl Default for BodyConfig {
@@ -74,6 +77,8 @@ impl Default for BodyConfig {
             max_fragment_share: 0.3,
             fragment_behind_m: 0.15,
             fragment_before_m: 0.5,
+            max_half_share: 2.0,
+            half_apart_m: 0.35,
         }
     }
 }

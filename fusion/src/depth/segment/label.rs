@@ -164,9 +164,9 @@ impl Labels {
     }
 
     /// Gives a body the small parts beside it that it must own: a hand in front of the chest, the far arm
-    /// of somebody seen from the side.
+    /// of somebody seen from the side; and the larger ones above or below it: legs behind a hem and a hand.
     pub(super) fn attach_fragments(&mut self, coarse: &Coarse, body: &Body, config: &BodyConfig) {
-        let mut contacts = vec![0_u32; self.sizes.len()];
+        let mut contacts = vec![Contact::default(); self.sizes.len()];
         let region =
             self.region_of(body.label, coarse)
                 .grown(LIMB_REACH, coarse.width, coarse.height);
@@ -182,21 +182,26 @@ impl Labels {
                     (y, -(coarse.width as isize)),
                     (coarse.height - 1 - y, coarse.width as isize),
                 ] {
-                    if let Some(label) =
-                        self.first_other(coarse, cell, [available as isize, step], config)
+                    if let Some((label, behind_m)) =
+                        self.first_other(coarse, cell, [available as isize, step])
                     {
-                        contacts[label as usize] += 1;
+                        contacts[label as usize].count(behind_m, config);
                     }
                 }
             }
         }
-        let most = (self.sizes[body.label as usize] as f32 * config.max_fragment_share) as u32;
-        let owned: Vec<bool> = contacts
-            .iter()
-            .zip(&self.sizes)
-            .map(|(&contacts, &size)| {
+        let own_cells = f64::from(self.sizes[body.label as usize]);
+        let owned: Vec<bool> = (0_u32..)
+            .zip(&contacts)
+            .map(|(label, contact)| {
+                let cells = f64::from(self.sizes[label as usize]);
                 // A part that touches along a good share of its outline, not in passing.
-                size <= most && f64::from(contacts) > 0.5 * f64::from(size).sqrt()
+                let limb = cells <= own_cells * f64::from(config.max_fragment_share)
+                    && f64::from(contact.limb) > 0.5 * cells.sqrt();
+                let half = cells <= own_cells * f64::from(config.max_half_share)
+                    && f64::from(contact.half) > 0.3 * cells.sqrt()
+                    && self.are_stacked(coarse, body.label, label);
+                limb || half
             })
             .collect();
         for cell in &mut self.cells {
@@ -206,21 +211,44 @@ impl Labels {
         }
     }
 
-    /// The part next to a body's cell in one direction, if the gap in depth is one a limb can leave.
+    /// The part next to a body's cell in one direction, and how far behind it is.
     fn first_other(
         &self,
         coarse: &Coarse,
         cell: usize,
         [available, step]: [isize; 2],
-        config: &BodyConfig,
-    ) -> Option<u32> {
+    ) -> Option<(u32, f32)> {
         let own = self.cells[cell];
         let other = (1..=available.min(LIMB_REACH as isize))
             .map(|distance| cell.wrapping_add_signed(distance * step))
             .find(|&other| self.cells[other] != NO_LABEL)?;
         let label = self.cells[other];
         let behind_m = coarse.points[other].z - coarse.points[cell].z;
+        (label != own).then_some((label, behind_m))
+    }
+
+    /// Whether one part is above the other rather than beside it, as two people would be.
+    fn are_stacked(&self, coarse: &Coarse, a: u32, b: u32) -> bool {
+        let (a, b) = (
+            self.region_of(a, coarse).rows,
+            self.region_of(b, coarse).rows,
+        );
+        let shared = a.end.min(b.end).saturating_sub(a.start.max(b.start));
+        2 * shared <= a.len().min(b.len())
+    }
+}
+
+/// Cells in which a part touches a body, by what the gap in depth allows it to be.
+#[derive(Clone, Copy, Debug, Default)]
+struct Contact {
+    limb: u32,
+    half: u32,
+}
+
+impl Contact {
+    fn count(&mut self, behind_m: f32, config: &BodyConfig) {
         let limb = behind_m < config.fragment_behind_m && behind_m > -config.fragment_before_m;
-        (label != own && limb).then_some(label)
+        self.limb += u32::from(limb);
+        self.half += u32::from(behind_m.abs() < config.half_apart_m);
     }
 }
