@@ -1,6 +1,7 @@
 //! The window on the main thread, the pipeline beside it.
 
 use std::{
+    panic::resume_unwind,
     path::PathBuf,
     sync::{
         Arc,
@@ -10,7 +11,7 @@ use std::{
     time::Duration,
 };
 
-use anyhow::{Context as _, anyhow};
+use anyhow::Context as _;
 use effigy_viewer::{SnapshotSlot, ViewerError, ViewerOptions, command_channel, run};
 
 use crate::{interrupt, pipeline::controls::Controls};

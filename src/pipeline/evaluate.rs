@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use anyhow::Context as _;
 use effigy_avatar::{
-    Avatar, DriveConfig, Driver, extract_posed, metrics, skinning::ClosestBodyPoint,
+    Avatar, DriveConfig, Driver, extract_posed, metrics,
+    skinning::{ClosestBodyPoint, ClosestBodyPointConfig},
 };
 use effigy_capture::Rigid3;
 use effigy_fusion::{TriangleMesh, mesh::normals::vertex_normals};
@@ -24,7 +25,7 @@ const OBSERVED_FRAMES: usize = 60;
 /// Frames, evenly spread, whose true surface is compared with surfaces extracted in full.
 const TRUTH_FRAMES: usize = 10;
 
-/// MetaAvatar's grid: its D_p means nothing at another density.
+/// MetaAvatar's grid: its `D_p` means nothing at another density.
 const RESOLUTION: usize = 256;
 
 /// Fills in the report's scores.
@@ -37,18 +38,16 @@ pub(crate) fn evaluate(
 ) -> anyhow::Result<()> {
     let unseen: Vec<&TrackedSample> = log.unseen().collect();
     let observed = evenly(&unseen, OBSERVED_FRAMES);
-    let mut bare = SurfaceScores::default();
-    bare.observed_mm = mean_observed(&observed, |sample| {
-        Ok(mesh(body.pose(&sample.params).vertices, &body.triangles))
-    })?;
+    let bare_mesh = |params: &BodyParams| mesh(body.pose(params).vertices, &body.triangles);
+    let bare_observed = mean_observed(&observed, |sample| bare_mesh(&sample.params))?;
+    let mut bare = SurfaceScores::default().with_observed(bare_observed);
     if let Some(truth) = truth {
-        report.body = body_scores(log, body, truth)?;
+        report.body = body_scores(log, body, truth);
         report.truth = Some(SurfaceScores {
             observed_mm: mean_observed(&observed, |sample| true_surface_in_world(truth, sample))?,
             ..SurfaceScores::default()
         });
         let compared = evenly(&unseen, TRUTH_FRAMES);
-        let bare_mesh = |params: &BodyParams| Ok(mesh(body.pose(params).vertices, &body.triangles));
         let judge = Judge { body, truth };
         bare = judge
             .scores(&compared, Poses::True, &bare_mesh)?
@@ -57,7 +56,7 @@ pub(crate) fn evaluate(
         report.bare_body_tracked = Some(tracked.with_observed(bare.observed_mm));
         if let Some(avatar) = avatar {
             let surface = FullSurface::new(avatar, body);
-            let avatar_mesh = |params: &BodyParams| Ok(surface.posed(params));
+            let avatar_mesh = |params: &BodyParams| surface.posed(params);
             report.avatar = Some(judge.scores(&compared, Poses::True, &avatar_mesh)?);
             report.avatar_tracked = Some(judge.scores(&compared, Poses::Tracked, &avatar_mesh)?);
         }
@@ -65,7 +64,7 @@ pub(crate) fn evaluate(
     if let Some(avatar) = avatar {
         let mut driver = Driver::new(Arc::clone(avatar), DriveConfig::default());
         let seen = mean_observed(&observed, |sample| {
-            Ok(driver.pose(&sample.params, sample.id).to_mesh())
+            driver.pose(&sample.params, sample.id).to_mesh()
         })?;
         report.avatar = Some(report.avatar.unwrap_or_default().with_observed(seen));
         report.avatar_tracked = report
@@ -100,7 +99,7 @@ impl Judge<'_> {
         &self,
         samples: &[&TrackedSample],
         poses: Poses,
-        surface_in_own_space: &dyn Fn(&BodyParams) -> anyhow::Result<TriangleMesh>,
+        surface_in_own_space: &dyn Fn(&BodyParams) -> TriangleMesh,
     ) -> anyhow::Result<SurfaceScores> {
         let measured = metrics::measured_vertices(self.body);
         let mut sums = [0.0_f64; 4];
@@ -110,7 +109,7 @@ impl Judge<'_> {
             let camera_from_sim = true_frame.world_from_camera.inverse();
             let params = self.params_in_camera(sample, &true_frame, poses);
             let truth = moved(&true_frame.clothed_in_world, camera_from_sim);
-            let predicted = surface_in_own_space(&params)?;
+            let predicted = surface_in_own_space(&params);
             let Some(scores) = metrics::surface_metrics(&truth, &measured, &predicted)? else {
                 continue;
             };
@@ -167,7 +166,7 @@ struct FullSurface<'a> {
 
 impl<'a> FullSurface<'a> {
     fn new(avatar: &'a Avatar, body: &Arc<BodyModel>) -> Self {
-        let config = Default::default();
+        let config = ClosestBodyPointConfig::default();
         let skinning = ClosestBodyPoint::new(Arc::clone(body), &avatar.subject.betas, config);
         Self { avatar, skinning }
     }
@@ -178,11 +177,7 @@ impl<'a> FullSurface<'a> {
 }
 
 /// Joints and vertices of the tracked body against the true one, over all tracked frames.
-fn body_scores(
-    log: &RunLog,
-    body: &BodyModel,
-    truth: &Truth,
-) -> anyhow::Result<Option<BodyScores>> {
+fn body_scores(log: &RunLog, body: &BodyModel, truth: &Truth) -> Option<BodyScores> {
     let mut sums = [0.0_f64; 2];
     for sample in &log.tracked {
         let true_frame = truth.at(sample.id);
@@ -203,13 +198,13 @@ fn body_scores(
         ));
     }
     let count = log.tracked.len() as f64;
-    Ok((count > 0.0).then(|| BodyScores { mpjpe_mm: sums[0] / count, v2v_mm: sums[1] / count }))
+    (count > 0.0).then(|| BodyScores { mpjpe_mm: sums[0] / count, v2v_mm: sums[1] / count })
 }
 
 /// Mean over frames of the mean distance from observed points to a surface in the sample's world.
 fn mean_observed(
     samples: &[&TrackedSample],
-    mut surface: impl FnMut(&TrackedSample) -> anyhow::Result<TriangleMesh>,
+    mut surface: impl FnMut(&TrackedSample) -> TriangleMesh,
 ) -> anyhow::Result<Option<f64>> {
     let mut sum = 0.0;
     for sample in samples {
@@ -218,7 +213,7 @@ fn mean_observed(
             .iter()
             .map(|&point| sample.world_from_camera * point)
             .collect();
-        let distance_mm = metrics::observed_mm(&points, &surface(sample)?)
+        let distance_mm = metrics::observed_mm(&points, &surface(sample))
             .with_context(|| format!("frame {}", sample.id.0))?;
         sum += f64::from(distance_mm);
     }
@@ -226,10 +221,10 @@ fn mean_observed(
 }
 
 /// The true surface in the world that tracking found for itself.
-fn true_surface_in_world(truth: &Truth, sample: &TrackedSample) -> anyhow::Result<TriangleMesh> {
+fn true_surface_in_world(truth: &Truth, sample: &TrackedSample) -> TriangleMesh {
     let true_frame = truth.at(sample.id);
     let world_from_sim = sample.world_from_camera * true_frame.world_from_camera.inverse();
-    Ok(moved(&true_frame.clothed_in_world, world_from_sim))
+    moved(&true_frame.clothed_in_world, world_from_sim)
 }
 
 fn moved(mesh_in_a: &TriangleMesh, b_from_a: Rigid3) -> TriangleMesh {

@@ -1,8 +1,13 @@
 //! At the source's pace: capture, tracking and driving each on a thread, late frames dropped and counted.
 
-use std::{sync::Arc, thread, time::Duration};
+use std::{
+    panic::resume_unwind,
+    sync::Arc,
+    thread::{self, ScopedJoinHandle},
+    time::Duration,
+};
 
-use anyhow::{Context as _, anyhow};
+use anyhow::Context as _;
 use crossbeam::channel::{Receiver, RecvTimeoutError, Sender, TrySendError, bounded};
 use effigy_capture::{Frame, FrameSource, Timestamp};
 use effigy_registration::{BodyModel, RegisteredFrame};
@@ -62,8 +67,8 @@ pub(crate) fn run(
         let driven = drive(&tracked, avatar, outputs, (&mut log, controls));
         // Closes the queue, so that the threads before it end too.
         drop(tracked);
-        let timings = track.join().map_err(|_| anyhow!("tracking panicked"))??;
-        let captured = capture.join().map_err(|_| anyhow!("capture panicked"))??;
+        let timings = joined(track)?;
+        let captured = joined(capture)?;
         driven?;
         log.delivered = captured.delivered;
         log.drop_frames("tracking was busy", captured.dropped);
@@ -73,6 +78,11 @@ pub(crate) fn run(
     avatar.finish()?;
     log.avatar_made(avatar);
     Ok(log)
+}
+
+/// A thread's result; its panic goes on here.
+fn joined<T>(thread: ScopedJoinHandle<'_, anyhow::Result<T>>) -> anyhow::Result<T> {
+    thread.join().unwrap_or_else(|panic| resume_unwind(panic))
 }
 
 #[derive(Clone, Copy, Debug, Default)]

@@ -57,12 +57,12 @@ fn files_introduce_themselves() {
 }
 
 fn visit(folder: &Path, check: &mut dyn FnMut(&Path, &str)) {
-    for entry in fs::read_dir(folder).unwrap() {
-        let path = entry.unwrap().path();
+    for entry in fs::read_dir(folder).expect("the folder is part of the workspace") {
+        let path = entry.expect("the folder can be listed").path();
         if path.is_dir() {
             visit(&path, check);
         } else if path.extension().is_some_and(|extension| extension == "rs") {
-            check(&path, &fs::read_to_string(&path).unwrap());
+            check(&path, &fs::read_to_string(&path).expect("sources are text"));
         }
     }
 }
