@@ -60,9 +60,7 @@ pub(crate) fn show(
         } else {
             interrupt::request();
         }
-        let worked = worker
-            .join()
-            .map_err(|_| anyhow!("the pipeline panicked"))?;
+        let worked = worker.join().unwrap_or_else(|panic| resume_unwind(panic));
         match shown {
             Ok(()) => worked.map(|()| Shown::Closed),
             Err(error) => Ok(Shown::Impossible(error)),
