@@ -36,7 +36,7 @@ impl Default for InitializeConfig {
             coarse_rounds: 2,
             keep: 24,
             middle_rounds: 6,
-            finalists: 5,
+            finalists: 10,
             final_rounds: 8,
         }
     }
