@@ -13,6 +13,7 @@ use super::{
     clock::{Clock, Timings},
     settings::Settings,
 };
+use crate::interrupt;
 
 /// When a finished avatar takes over.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -109,8 +110,11 @@ impl AvatarStage {
         )
     }
 
-    /// Waits for an avatar that is being made, at the end of a source.
-    pub(crate) fn finish(&mut self) -> anyhow::Result<bool> {
+    /// Waits for an avatar that is being made, at the end of a source; not if the user wants to stop.
+    pub(crate) fn end(&mut self) -> anyhow::Result<bool> {
+        if interrupt::requested() {
+            self.cancel();
+        }
         let State::Making { job, .. } = &mut self.state else {
             return Ok(false);
         };

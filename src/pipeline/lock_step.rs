@@ -32,7 +32,7 @@ pub(crate) fn run(
         let mesh = avatar.drive(&registered);
         outputs.frame(&frame, &registered, mesh.as_ref(), (avatar, &log))?;
     }
-    avatar.finish()?;
+    avatar.end()?;
     log.timings.merge(tracking.timings);
     log.avatar_made(avatar);
     Ok(log)

@@ -75,7 +75,7 @@ pub(crate) fn run(
         log.timings.merge(timings);
         anyhow::Ok(())
     })?;
-    avatar.finish()?;
+    avatar.end()?;
     log.avatar_made(avatar);
     Ok(log)
 }
