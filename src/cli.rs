@@ -136,6 +136,9 @@ pub(crate) struct ChainArgs {
     /// Write each frame's posed avatar in depth-camera space as PLY
     #[arg(long, value_name = "DIR")]
     pub(crate) meshes: Option<PathBuf>,
+    /// Record the frames that were looked at and what was decided about the avatar: a replay repeats this run
+    #[arg(long, value_name = "FILE")]
+    pub(crate) record: Option<PathBuf>,
     /// Write the report here as well
     #[arg(long, value_name = "FILE")]
     pub(crate) json: Option<PathBuf>,

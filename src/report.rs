@@ -21,6 +21,9 @@ pub(crate) struct Report {
     pub(crate) time_to_first_track_secs: Option<f64>,
     pub(crate) tracked_fraction: Option<f64>,
     pub(crate) keyframes: usize,
+    /// How many were made: the first one, and better ones after it.
+    pub(crate) avatars: usize,
+    /// Of the avatar that was driven last.
     pub(crate) fine_tune: Option<FineTuneFigures>,
     pub(crate) time_to_first_avatar_secs: Option<f64>,
     pub(crate) latency_ms: Option<Latency>,
@@ -38,6 +41,9 @@ pub(crate) struct FrameCounts {
     #[serde(rename = "in")]
     pub(crate) delivered: u64,
     pub(crate) tracked: u64,
+    /// Somebody was in view, but too little of them to fit a body to.
+    pub(crate) partial: u64,
+    pub(crate) lost: u64,
     /// By cause.
     pub(crate) dropped: BTreeMap<String, u64>,
 }
@@ -56,6 +62,9 @@ pub(crate) struct Latency {
     pub(crate) p50: f64,
     pub(crate) p95: f64,
     pub(crate) p95_while_fine_tuning: Option<f64>,
+    /// Of the frames that moved an avatar while none was being made.
+    pub(crate) p50_driving: Option<f64>,
+    pub(crate) p95_driving: Option<f64>,
 }
 
 #[derive(Clone, Copy, Debug, Serialize)]
@@ -103,11 +112,7 @@ impl Report {
 impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let counts = &self.frames;
-        writeln!(
-            f,
-            "frames      {} in, {} tracked",
-            counts.delivered, counts.tracked
-        )?;
+        writeln!(f, "frames      {counts}")?;
         for (cause, count) in &counts.dropped {
             writeln!(f, "            {count} dropped: {cause}")?;
         }
@@ -118,11 +123,14 @@ impl fmt::Display for Report {
                 time.p50, time.p95
             )?;
         }
+        if let Some(latency) = &self.latency_ms {
+            writeln!(f, "latency     {latency}")?;
+        }
         if let Some(tune) = &self.fine_tune {
             writeln!(
                 f,
-                "fine-tuning {} steps in {:.1} s, {:.1} mm held out",
-                tune.steps, tune.seconds, tune.held_out_mm
+                "fine-tuning {} steps in {:.1} s, {:.1} mm held out; {} avatars made",
+                tune.steps, tune.seconds, tune.held_out_mm, self.avatars
             )?;
         }
         if let Some(body) = &self.body {
@@ -139,11 +147,61 @@ impl fmt::Display for Report {
             ("  tracked", self.bare_body_tracked),
             ("truth", self.truth),
         ] {
-            if let Some(scores) = scores {
+            if let Some(scores) = scores.filter(SurfaceScores::has_figures) {
                 writeln!(f, "{name:<11} {scores}")?;
             }
         }
         write!(f, "in all      {:.1} s", self.seconds_total)
+    }
+}
+
+impl fmt::Display for FrameCounts {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} in, {} tracked", self.delivered, self.tracked)?;
+        for (count, what) in [
+            (self.partial, "with too little of a person in view"),
+            (self.lost, "without a person"),
+        ] {
+            if count > 0 {
+                write!(f, ", {count} {what}")?;
+            }
+        }
+        if self.tracked == 0 && self.delivered > 0 {
+            let remedy = if self.partial > 0 {
+                "step back until head and feet are in view"
+            } else {
+                "stand 1 to 4 m from the sensor, upright, with some room around you"
+            };
+            write!(f, "\n            nobody was found: {remedy}")?;
+        }
+        Ok(())
+    }
+}
+
+impl fmt::Display for Latency {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{:.1} ms p50, {:.1} ms p95", self.p50, self.p95)?;
+        let driving = self.p50_driving.zip(self.p95_driving);
+        if let Some((p50, p95)) = driving {
+            write!(f, "; avatar driven {p50:.1} ms p50, {p95:.1} ms p95")?;
+        }
+        if let Some(p95) = self.p95_while_fine_tuning {
+            write!(f, "; while fine-tuning {p95:.1} ms p95")?;
+        }
+        Ok(())
+    }
+}
+
+impl SurfaceScores {
+    fn has_figures(&self) -> bool {
+        let figures = [
+            self.observed_mm,
+            self.d_p_cm,
+            self.d_f_cm,
+            self.nc,
+            self.p2s_mm,
+        ];
+        figures.iter().any(Option::is_some)
     }
 }
 

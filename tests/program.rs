@@ -1,10 +1,15 @@
 //! The program as its users meet it: commands, exit codes, messages, files.
 
 use std::{
-    fs,
+    fs::{self, File},
+    io::{self, Write as _},
+    iter,
     path::Path,
     process::{Command, Output},
 };
+
+use image::{ImageBuffer, Luma};
+use zip::{ZipWriter, write::SimpleFileOptions};
 
 /// Of clap: what was typed makes no sense.
 const USAGE: i32 = 2;
@@ -44,6 +49,30 @@ fn simulate(folder: &Path, name: &str, seconds: &str) {
         "turn-around",
     ];
     assert_succeeds(&effigy(folder, &arguments));
+}
+
+fn report(out: &Path) -> serde_json::Value {
+    let text = fs::read(out.join("report.json")).expect("the run wrote a report");
+    serde_json::from_slice(&text).expect("a report is JSON")
+}
+
+/// An archive of one array of zeros.
+fn write_npz(path: &Path, name: &str, shape: &[usize]) -> io::Result<()> {
+    let sizes: Vec<String> = shape.iter().map(ToString::to_string).collect();
+    let sizes = sizes.join(", ");
+    let mut header = format!("{{'descr': '<f8', 'fortran_order': False, 'shape': ({sizes},), }}");
+    // The format wants its data aligned to 64 bytes.
+    header.extend(iter::repeat_n(' ', 63 - (header.len() + 10) % 64));
+    header.push('\n');
+    let count: usize = shape.iter().product();
+    let mut archive = ZipWriter::new(File::create(path)?);
+    archive.start_file(format!("{name}.npy"), SimpleFileOptions::default())?;
+    archive.write_all(b"\x93NUMPY\x01\x00")?;
+    archive.write_all(&(header.len() as u16).to_le_bytes())?;
+    archive.write_all(header.as_bytes())?;
+    archive.write_all(&vec![0; 8 * count])?;
+    archive.finish()?;
+    Ok(())
 }
 
 #[test]
@@ -101,6 +130,137 @@ fn unwritable_outputs_are_refused_before_the_work_begins() {
 }
 
 #[test]
+fn a_body_file_with_wrong_shapes_is_refused_by_name_shape_and_expectation() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    write_npz(&here.join("body.npz"), "v_template", &[30, 2]).unwrap();
+    let demo = [
+        "demo",
+        "--headless",
+        "--seconds",
+        "1",
+        "--out",
+        "out",
+        "--body",
+        "body.npz",
+    ];
+    assert_fails(
+        &effigy(here, &demo),
+        DATA,
+        &["body.npz", "v_template", "[30, 2]"],
+    );
+}
+
+#[test]
+fn frames_without_anybody_are_no_error_and_the_report_says_so() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    fs::create_dir(here.join("room")).unwrap();
+    // Nothing measured at all, a wall, a wall so near that it is out of range.
+    for (number, millimetres) in [0_u16, 2500, 2500, 100].into_iter().enumerate() {
+        let depth = ImageBuffer::from_pixel(640, 480, Luma([millimetres]));
+        depth.save(here.join(format!("room/{number}.png"))).unwrap();
+    }
+    let output = effigy(here, &["replay", "room", "--headless", "--out", "out"]);
+    assert_succeeds(&output);
+    let report = report(&here.join("out"));
+    assert_eq!(report["frames"]["in"], 4);
+    assert_eq!(report["frames"]["tracked"], 0);
+    assert_eq!(report["frames"]["lost"], 4);
+    assert!(report["avatar"].is_null());
+    let said = String::from_utf8_lossy(&output.stdout);
+    assert!(said.contains("nobody was found"), "{said}");
+}
+
+#[test]
+fn points_that_are_not_numbers_are_holes() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let (width, height) = (64, 48);
+    let head = format!(
+        "# .PCD v0.7\nVERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH {width}\n\
+         HEIGHT {height}\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS {}\nDATA ascii\n",
+        width * height
+    );
+    fs::write(
+        here.join("nan.pcd"),
+        head + &"nan nan nan\n".repeat(width * height),
+    )
+    .unwrap();
+    let output = effigy(here, &["replay", "nan.pcd", "--headless", "--out", "out"]);
+    assert_succeeds(&output);
+    assert_eq!(report(&here.join("out"))["frames"]["lost"], 1);
+}
+
+#[test]
+fn an_image_of_another_size_is_an_error_that_names_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    fs::create_dir(here.join("room")).unwrap();
+    for (number, width) in [640, 320].into_iter().enumerate() {
+        let depth = ImageBuffer::from_pixel(width, 480, Luma([2500_u16]));
+        depth.save(here.join(format!("room/{number}.png"))).unwrap();
+    }
+    assert_fails(
+        &effigy(here, &["replay", "room", "--headless", "--out", "out"]),
+        DATA,
+        &["1.png", "320", "640"],
+    );
+}
+
+#[test]
+fn a_live_run_that_was_recorded_repeats_itself_with_its_avatar() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    simulate(here, "s.mcap", "4");
+    fs::write(here.join("quick.toml"), "[fine_tune]\nsteps = 4\n").unwrap();
+    let run = |arguments: &[&str], name: &str| {
+        let poses = format!("{name}.json");
+        let common = [
+            "--headless",
+            "--config",
+            "quick.toml",
+            "--keyframes",
+            "2",
+            "--out",
+            name,
+            "--poses",
+            &poses,
+            "--meshes",
+            name,
+        ];
+        assert_succeeds(&effigy(here, &[arguments, &common].concat()));
+    };
+    run(
+        &["replay", "s.mcap", "--realtime", "--record", "live.mcap"],
+        "live",
+    );
+    run(&["replay", "live.mcap"], "again");
+    let poses = |name: &str| fs::read(here.join(format!("{name}.json"))).unwrap();
+    assert!(poses("live") == poses("again"), "poses differ");
+    let meshes = |name: &str| -> Vec<_> {
+        let files = fs::read_dir(here.join(name)).unwrap();
+        let mut meshes: Vec<_> = files
+            .map(|file| file.unwrap().path())
+            .filter(|path| path.extension().is_some_and(|extension| extension == "ply"))
+            .map(|path| {
+                (
+                    path.file_name().unwrap().to_owned(),
+                    fs::read(path).unwrap(),
+                )
+            })
+            .collect();
+        meshes.sort();
+        meshes
+    };
+    assert!(
+        !meshes("live").is_empty(),
+        "the avatar took over while frames still came"
+    );
+    assert!(meshes("live") == meshes("again"), "meshes differ");
+}
+
+#[test]
 fn two_replays_of_a_recording_track_the_same_to_the_last_bit() {
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
@@ -133,9 +293,7 @@ fn a_recording_cut_off_plays_up_to_the_cut_and_says_what_is_missing() {
     let output = effigy(here, &["replay", "cut.mcap", "--headless", "--out", "out"]);
     assert_succeeds(&output);
     assert!(String::from_utf8_lossy(&output.stderr).contains("cut.mcap"));
-    let report: serde_json::Value =
-        serde_json::from_slice(&fs::read(here.join("out/report.json")).unwrap()).unwrap();
-    let frames = report["frames"]["in"].as_u64().unwrap();
+    let frames = report(&here.join("out"))["frames"]["in"].as_u64().unwrap();
     assert!(
         (10..60).contains(&frames),
         "{frames} frames of 60 before the cut"

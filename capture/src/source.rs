@@ -24,6 +24,11 @@ pub trait FrameSource: Send {
     fn frame_count(&self) -> Option<u64> {
         None
     }
+
+    /// The player, if this is a recording: for going to other places in it.
+    fn player(&mut self) -> Option<&mut Player> {
+        None
+    }
 }
 
 /// Opens a recording, a folder of depth images, a point cloud or a depth image: what it is shows in its first bytes.

@@ -168,6 +168,12 @@ impl Tracker {
         self.shape = ShapeFit::new(Arc::clone(&self.surface));
         self.shape_known = false;
         self.first_track = None;
+        self.forget_pose();
+    }
+
+    /// Searches for the body again: the next frame is not the one after the last, as after a jump in a recording.
+    /// The person's shape and the floor stay known.
+    pub fn forget_pose(&mut self) {
         self.phase = Phase::Searching { since: None, last_try: None, last_seen: None };
     }
 

@@ -1,6 +1,6 @@
 //! What the demo and a replay share: source in, avatar and report out.
 
-use std::{path::Path, sync::Arc};
+use std::{collections::BTreeMap, path::Path, sync::Arc};
 
 use effigy_capture::FrameSource;
 use effigy_registration::{BodyModel, smpl::builtin};
@@ -13,7 +13,7 @@ use crate::{
     cli::ChainArgs,
     machine::{Machine, peak_memory_mb},
     pipeline::{
-        avatar_stage::{AvatarStage, Swap},
+        avatar_stage::AvatarStage,
         clock::{Clock, percentile},
         controls::Controls,
         evaluate::evaluate,
@@ -21,7 +21,9 @@ use crate::{
         outputs::Outputs,
         publish::Publisher,
         real_time,
-        run_log::RunLog,
+        recorder::{Recorder, WhenDiskIsSlow},
+        run_log::{FrameLatency, RunLog},
+        schedule::Schedule,
         settings::Settings,
     },
     report::{FineTuneFigures, FrameCounts, Latency, Report, SCHEMA},
@@ -31,6 +33,10 @@ pub(crate) struct Input {
     pub(crate) source: Box<dyn FrameSource>,
     pub(crate) truth: Option<Truth>,
     pub(crate) pace: Pace,
+    /// What a recording of this run says about where it comes from.
+    pub(crate) metadata: BTreeMap<String, String>,
+    /// What was decided when this recording was made.
+    pub(crate) decided: Option<Schedule>,
 }
 
 /// Who sets the pace.
@@ -89,11 +95,21 @@ fn run_chain(
             clock,
         ));
     }
-    let swap = match input.pace {
-        Pace::LockStep => Swap::AfterFrames(settings.schedule.swap_after_frames),
-        Pace::RealTime => Swap::WhenReady,
+    if let Some(path) = &args.record {
+        let when_slow = match input.pace {
+            Pace::LockStep => WhenDiskIsSlow::Wait,
+            Pace::RealTime => WhenDiskIsSlow::LeaveOut,
+        };
+        let recorder = Recorder::create(path, &calibration, &input.metadata, when_slow)?;
+        outputs.record_to(recorder);
+    }
+    let by_count = Schedule::AfterFrames(settings.schedule.swap_after_frames);
+    let schedule = match input.pace {
+        Pace::LockStep => input.decided.unwrap_or(by_count),
+        Pace::RealTime => Schedule::WhenReady,
     };
-    let mut avatar = AvatarStage::new(Arc::clone(&body), calibration.depth, &settings, swap, clock);
+    let depth = calibration.depth;
+    let mut avatar = AvatarStage::new(Arc::clone(&body), depth, &settings, schedule, clock);
     let stages = (&mut avatar, &mut outputs);
     let log = match input.pace {
         Pace::LockStep => lock_step::run(&mut *input.source, &body, &settings, stages, clock)?,
@@ -138,18 +154,21 @@ fn report(source: String, log: &RunLog) -> Report {
         frames: FrameCounts {
             delivered: log.delivered,
             tracked: log.tracked.len() as u64,
+            partial: log.partial,
+            lost: log.lost,
             dropped: log.dropped.clone(),
         },
         time_to_first_track_secs: log.time_to_first_track_secs(),
         tracked_fraction: log.tracked_fraction(),
         keyframes: log.keyframes.len(),
-        fine_tune: log.job.map(|job| FineTuneFigures {
+        avatars: log.jobs.len(),
+        fine_tune: log.jobs.last().map(|job| FineTuneFigures {
             steps: job.steps,
             seconds: job.fine_tune_secs,
             loss: job.loss,
             held_out_mm: job.held_out_mm,
         }),
-        time_to_first_avatar_secs: log.job.map(|job| job.total_secs),
+        time_to_first_avatar_secs: log.jobs.first().map(|job| job.total_secs),
         latency_ms: latency(log),
         stages_ms: log.timings.summary(),
         body: None,
@@ -163,17 +182,18 @@ fn report(source: String, log: &RunLog) -> Report {
 
 /// `None` where nobody's clock set the pace.
 fn latency(log: &RunLog) -> Option<Latency> {
-    let of = |wanted: bool| -> Vec<f32> {
-        let picked = log
-            .latencies_ms
-            .iter()
-            .filter(|(_, tuning)| *tuning == wanted);
-        picked.map(|(milliseconds, _)| *milliseconds).collect()
+    let of = |wanted: &dyn Fn(&FrameLatency) -> bool| -> Vec<f32> {
+        let picked = log.latencies.iter().filter(|latency| wanted(latency));
+        picked.map(|latency| latency.milliseconds).collect()
     };
-    let (alone, tuning) = (of(false), of(true));
+    let alone = of(&|latency| !latency.fine_tuning);
+    let driving = of(&|latency| latency.driving && !latency.fine_tuning);
+    let tuning = of(&|latency| latency.fine_tuning);
     Some(Latency {
         p50: percentile(&alone, 0.5)?,
         p95: percentile(&alone, 0.95)?,
         p95_while_fine_tuning: percentile(&tuning, 0.95),
+        p50_driving: percentile(&driving, 0.5),
+        p95_driving: percentile(&driving, 0.95),
     })
 }

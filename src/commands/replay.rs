@@ -1,8 +1,9 @@
 //! `effigy replay`: a recording, a folder or a single frame through the whole chain.
 
+use std::collections::BTreeMap;
+
 use anyhow::Context as _;
 use effigy_capture::{
-    FrameSource,
     recording::{Player, Recording},
     source,
 };
@@ -13,7 +14,7 @@ use super::{
     chain::{self, Input, Pace},
     simulate::SCENARIO_KEY,
 };
-use crate::cli::ReplayArgs;
+use crate::{cli::ReplayArgs, pipeline::schedule::Schedule};
 
 pub(crate) fn run(args: &ReplayArgs) -> anyhow::Result<()> {
     let pace = if args.realtime {
@@ -22,27 +23,44 @@ pub(crate) fn run(args: &ReplayArgs) -> anyhow::Result<()> {
         Pace::LockStep
     };
     let open = || {
-        let (source, truth) = open(args)?;
-        Ok(Input { source, truth, pace })
+        let input = open(args)?;
+        Ok(Input { pace, ..input })
     };
     chain::run(open, &args.chain)
 }
 
-/// The source, and the truth if a simulator left its scenario in the recording.
-fn open(args: &ReplayArgs) -> anyhow::Result<(Box<dyn FrameSource>, Option<Truth>)> {
+/// The source; of a recording, also the truth if a simulator left its scenario there, and what was decided live.
+fn open(args: &ReplayArgs) -> anyhow::Result<Input> {
     let is_recording = args
         .input
         .extension()
         .is_some_and(|extension| extension == "mcap");
     if !is_recording {
-        return Ok((source::open(&args.input)?, None));
+        return Ok(Input {
+            source: source::open(&args.input)?,
+            truth: None,
+            pace: Pace::LockStep,
+            metadata: BTreeMap::new(),
+            decided: None,
+        });
     }
     let recording = Recording::open(&args.input)?;
     if let Some(damage) = recording.damage() {
         eprintln!("effigy: {}: {damage}", args.input.display());
     }
-    let truth = recording.metadata(SCENARIO_KEY).map(truth_of).transpose()?;
-    Ok((Box::new(Player::new(recording)), truth))
+    let scenario = recording.metadata(SCENARIO_KEY);
+    let truth = scenario.map(truth_of).transpose()?;
+    let metadata = scenario.map(|text| (SCENARIO_KEY.to_owned(), text.to_owned()));
+    let metadata = metadata.into_iter().collect();
+    let decided =
+        Schedule::recorded(recording.events()).with_context(|| args.input.display().to_string())?;
+    Ok(Input {
+        source: Box::new(Player::new(recording)),
+        truth,
+        pace: Pace::LockStep,
+        metadata,
+        decided,
+    })
 }
 
 fn truth_of(scenario: &str) -> anyhow::Result<Truth> {

@@ -6,11 +6,11 @@ use std::{
         Arc, Mutex, PoisonError,
         atomic::{AtomicBool, Ordering},
     },
-    thread,
+    thread::{self, JoinHandle},
 };
 
 use anyhow::{Context as _, anyhow, ensure};
-use crossbeam::channel::{Receiver, TryRecvError, bounded};
+use crossbeam::channel::{Receiver, bounded};
 use effigy_avatar::{
     Avatar, CanonicalSamples, Canonicaliser, TopologyConfig,
     fine_tune::{FineTuneProgress, fine_tune},
@@ -28,6 +28,7 @@ pub(crate) struct AvatarJob {
     cancel: Arc<AtomicBool>,
     progress: Arc<Mutex<FineTuneProgress>>,
     result: Receiver<anyhow::Result<FinishedAvatar>>,
+    thread: JoinHandle<()>,
 }
 
 pub(crate) struct FinishedAvatar {
@@ -65,7 +66,7 @@ impl AvatarJob {
             progress: Arc::clone(&progress),
             clock,
         };
-        thread::Builder::new()
+        let thread = thread::Builder::new()
             .name("fine-tune".to_owned())
             .spawn(move || {
                 lower_priority();
@@ -73,16 +74,12 @@ impl AvatarJob {
                 drop(sender.send(work.run()));
             })
             .context("cannot start the fine-tuning thread")?;
-        Ok(Self { cancel, progress, result })
+        Ok(Self { cancel, progress, result, thread })
     }
 
-    /// The result, once there is one; never waits.
-    pub(crate) fn poll(&self) -> Option<anyhow::Result<FinishedAvatar>> {
-        match self.result.try_recv() {
-            Ok(finished) => Some(finished),
-            Err(TryRecvError::Empty) => None,
-            Err(TryRecvError::Disconnected) => Some(Err(died())),
-        }
+    /// Whether [`Self::wait`] would return at once.
+    pub(crate) fn is_finished(&self) -> bool {
+        !self.result.is_empty() || self.thread.is_finished()
     }
 
     pub(crate) fn wait(&self) -> anyhow::Result<FinishedAvatar> {

@@ -1,6 +1,6 @@
-//! From tracked bodies to a driven avatar: collects keyframes, has the avatar made, drives it.
+//! From tracked bodies to a driven avatar: collects keyframes, has the avatar made and made better, drives it.
 
-use std::sync::Arc;
+use std::{collections::BTreeSet, sync::Arc};
 
 use effigy_avatar::{
     Avatar, AvatarMesh, DriveConfig, Driver, KeyframeSelector, fine_tune::FineTuneProgress,
@@ -11,44 +11,40 @@ use effigy_registration::{BodyModel, RegisteredFrame};
 use super::{
     avatar_job::{AvatarJob, FinishedAvatar, JobFigures},
     clock::{Clock, Timings},
+    schedule::{Decision, Schedule},
     settings::Settings,
 };
 use crate::interrupt;
-
-/// When a finished avatar takes over.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Swap {
-    /// A fixed number of frames after it was asked for, waiting for it if need be: repeatable.
-    AfterFrames(u64),
-    /// As soon as it is there: live.
-    WhenReady,
-}
 
 pub(crate) struct AvatarStage {
     body: Arc<BodyModel>,
     camera: CameraModel,
     settings: Settings,
-    swap: Swap,
+    schedule: Schedule,
     clock: Clock,
     selector: KeyframeSelector,
-    state: State,
+    making: Option<Making>,
+    made: Option<Made>,
+    gave_up: bool,
+    /// What the user asked for since the last frame.
+    requests: Vec<Decision>,
+    /// All frames that any avatar learned from.
+    learned_from: BTreeSet<FrameId>,
+    /// One entry an avatar, the first one first.
+    figures: Vec<JobFigures>,
     pub(crate) timings: Timings,
 }
 
-enum State {
-    Collecting,
-    Making {
-        job: AvatarJob,
-        frames_since_asked: u64,
-    },
-    Driving(Box<Made>),
-    /// Asked to stop before there was an avatar, or none could be made.
-    GaveUp,
+struct Making {
+    job: AvatarJob,
+    frames_since_begun: u64,
+    keyframes: Vec<FrameId>,
 }
 
 struct Made {
     driver: Driver,
-    figures: JobFigures,
+    frames_driven: u64,
+    keyframes: Vec<FrameId>,
 }
 
 impl AvatarStage {
@@ -56,52 +52,60 @@ impl AvatarStage {
         body: Arc<BodyModel>,
         camera: CameraModel,
         settings: &Settings,
-        swap: Swap,
+        schedule: Schedule,
         clock: Clock,
     ) -> Self {
         Self {
             body,
             camera,
             settings: settings.clone(),
-            swap,
+            schedule,
             clock,
             selector: KeyframeSelector::new(settings.keyframes.clone()),
-            state: State::Collecting,
+            making: None,
+            made: None,
+            gave_up: false,
+            requests: Vec::new(),
+            learned_from: BTreeSet::new(),
+            figures: Vec::new(),
             timings: Timings::default(),
         }
     }
 
-    /// Looks at a frame for keyframes, starts fine-tuning, and takes over its result when due.
-    /// Returns the keyframes' numbers when the avatar has just taken over.
-    pub(crate) fn advance(&mut self, registered: &RegisteredFrame) -> anyhow::Result<bool> {
-        match &mut self.state {
-            State::Collecting => {
-                let selector = &mut self.selector;
-                self.timings
-                    .time(&self.clock, "keyframes", || selector.consider(registered));
-                if self.selector.is_full() {
-                    self.start()?;
-                }
-                Ok(false)
-            }
-            State::Making { job, frames_since_asked } => {
-                *frames_since_asked += 1;
-                let finished = match self.swap {
-                    Swap::AfterFrames(frames) if *frames_since_asked < frames => None,
-                    Swap::AfterFrames(_) => Some(job.wait()),
-                    Swap::WhenReady => job.poll(),
-                };
-                finished.map_or(Ok(false), |finished| self.take_over(finished))
-            }
-            State::Driving(_) | State::GaveUp => Ok(false),
+    /// Looks at a frame for keyframes, begins avatars and lets finished ones take over. Returns what was decided.
+    pub(crate) fn advance(
+        &mut self,
+        registered: &RegisteredFrame,
+    ) -> anyhow::Result<Vec<Decision>> {
+        let selector = &mut self.selector;
+        self.timings
+            .time(&self.clock, "keyframes", || selector.consider(registered));
+        if let Some(making) = &mut self.making {
+            making.frames_since_begun += 1;
         }
+        if let Some(made) = &mut self.made {
+            made.frames_driven += 1;
+        }
+        let mut decided = self.schedule.due(registered.id());
+        decided.append(&mut self.requests);
+        for decision in &decided {
+            self.perform(*decision)?;
+        }
+        if let Some(decision) = self.decide() {
+            self.perform(decision)?;
+            decided.push(decision);
+        }
+        Ok(decided)
+    }
+
+    /// Takes effect with the next frame.
+    pub(crate) fn request(&mut self, decision: Decision) {
+        self.requests.push(decision);
     }
 
     /// The avatar in the tracked pose, once there is one.
     pub(crate) fn drive(&mut self, registered: &RegisteredFrame) -> Option<AvatarMesh> {
-        let State::Driving(made) = &mut self.state else {
-            return None;
-        };
+        let made = self.made.as_mut()?;
         let params = registered.params()?;
         let id = registered.id();
         Some(
@@ -111,50 +115,24 @@ impl AvatarStage {
     }
 
     /// Waits for an avatar that is being made, at the end of a source; not if the user wants to stop.
-    pub(crate) fn end(&mut self) -> anyhow::Result<bool> {
-        if interrupt::requested() {
-            self.cancel();
-        }
-        let State::Making { job, .. } = &mut self.state else {
-            return Ok(false);
+    pub(crate) fn end(&mut self) -> anyhow::Result<()> {
+        let decision = if interrupt::requested() {
+            Decision::Cancel
+        } else {
+            Decision::TakeOver
         };
-        let finished = job.wait();
-        self.take_over(finished)
+        self.perform(decision)
     }
 
-    /// Starts with the keyframes there are; `false` without any.
-    pub(crate) fn start(&mut self) -> anyhow::Result<bool> {
-        if self.selector.keyframes().is_empty() {
-            return Ok(false);
-        }
-        let keyframes = self.selector.keyframes().to_vec();
-        let job = AvatarJob::start(
-            (keyframes, self.camera),
-            &self.body,
-            &self.settings,
-            self.clock,
-        )?;
-        self.state = State::Making { job, frames_since_asked: 0 };
-        Ok(true)
-    }
-
-    pub(crate) fn cancel(&mut self) {
-        if matches!(self.state, State::Making { .. }) {
-            self.state = State::GaveUp;
-        }
-    }
-
-    pub(crate) fn start_over(&mut self) {
-        self.selector.clear();
-        self.state = State::Collecting;
-    }
-
+    /// What the avatar that is driven learned from, or what the first one will.
     pub(crate) fn keyframe_ids(&self) -> Vec<FrameId> {
-        self.selector
-            .keyframes()
-            .iter()
-            .map(|keyframe| keyframe.frame.id())
-            .collect()
+        self.made
+            .as_ref()
+            .map_or_else(|| ids(&self.selector), |made| made.keyframes.clone())
+    }
+
+    pub(crate) fn learned_from(&self) -> &BTreeSet<FrameId> {
+        &self.learned_from
     }
 
     pub(crate) fn keyframe_count(&self) -> usize {
@@ -166,58 +144,130 @@ impl AvatarStage {
     }
 
     pub(crate) fn avatar(&self) -> Option<&Arc<Avatar>> {
-        match &self.state {
-            State::Driving(made) => Some(made.driver.avatar()),
-            State::Collecting | State::Making { .. } | State::GaveUp => None,
-        }
+        self.made.as_ref().map(|made| made.driver.avatar())
     }
 
-    pub(crate) fn figures(&self) -> Option<JobFigures> {
-        match &self.state {
-            State::Driving(made) => Some(made.figures),
-            State::Collecting | State::Making { .. } | State::GaveUp => None,
-        }
+    /// What making each avatar took, the first one first.
+    pub(crate) fn figures(&self) -> &[JobFigures] {
+        &self.figures
     }
 
     pub(crate) fn progress(&self) -> Option<FineTuneProgress> {
-        match &self.state {
-            State::Making { job, .. } => Some(job.progress()),
-            State::Collecting | State::Driving(_) | State::GaveUp => None,
-        }
+        self.making.as_ref().map(|making| making.job.progress())
     }
 
     /// What the stage is doing, for people.
     pub(crate) fn status(&self) -> String {
-        match &self.state {
-            State::Collecting => format!(
+        let live = if self.made.is_some() {
+            "avatar live"
+        } else {
+            ""
+        };
+        if let Some(now) = self.progress() {
+            let (what, separator) = if self.made.is_some() {
+                ("improving", ", ")
+            } else {
+                ("fine-tuning", "")
+            };
+            return format!(
+                "{live}{separator}{what} {}/{}, {:.1} mm held out, {:.0} s left",
+                now.step,
+                now.steps,
+                now.held_out_residual_m * 1e3,
+                now.left_secs
+            );
+        }
+        match (self.made.is_some(), self.gave_up) {
+            (true, _) => live.to_owned(),
+            (false, true) => "no avatar".to_owned(),
+            (false, false) => format!(
                 "keyframes {}/{}",
-                self.selector.keyframes().len(),
-                self.settings.keyframes.count
+                self.keyframe_count(),
+                self.keyframes_wanted()
             ),
-            State::Making { job, .. } => {
-                let now = job.progress();
-                format!(
-                    "fine-tuning {}/{}, {:.1} mm held out, {:.0} s left",
-                    now.step,
-                    now.steps,
-                    now.held_out_residual_m * 1e3,
-                    now.left_secs
-                )
-            }
-            State::Driving(_) => "avatar live".to_owned(),
-            State::GaveUp => "no avatar".to_owned(),
         }
     }
 
     pub(crate) fn is_making(&self) -> bool {
-        matches!(self.state, State::Making { .. })
+        self.making.is_some()
     }
 
-    fn take_over(&mut self, finished: anyhow::Result<FinishedAvatar>) -> anyhow::Result<bool> {
-        self.state = State::GaveUp;
-        let FinishedAvatar { avatar, figures } = finished?;
-        let driver = Driver::new(Arc::new(avatar), DriveConfig::default());
-        self.state = State::Driving(Box::new(Made { driver, figures }));
-        Ok(true)
+    /// What is due without anybody having asked for it.
+    fn decide(&self) -> Option<Decision> {
+        if let Some(making) = &self.making {
+            let due = match self.schedule {
+                Schedule::AfterFrames(frames) => making.frames_since_begun >= frames,
+                Schedule::WhenReady => making.job.is_finished(),
+                Schedule::AsRecorded(_) => false,
+            };
+            return due.then_some(Decision::TakeOver);
+        }
+        let wanted = match &self.made {
+            None => self.selector.is_full(),
+            Some(made) => self.has_better_keyframes(made),
+        };
+        let by_record = matches!(self.schedule, Schedule::AsRecorded(_));
+        (wanted && !self.gave_up && !by_record).then_some(Decision::Begin)
     }
+
+    /// Whether the keyframes have changed so much that another avatar would be worth its time.
+    fn has_better_keyframes(&self, made: &Made) -> bool {
+        let config = &self.settings.schedule;
+        let fresh = ids(&self.selector)
+            .iter()
+            .filter(|id| !made.keyframes.contains(id))
+            .count();
+        made.frames_driven >= config.improve_after_frames && fresh >= config.improve_new_keyframes
+    }
+
+    fn perform(&mut self, decision: Decision) -> anyhow::Result<()> {
+        match decision {
+            Decision::Begin => self.begin(),
+            Decision::TakeOver => self.take_over(),
+            Decision::Cancel => {
+                self.gave_up |= self.making.take().is_some();
+                Ok(())
+            }
+            Decision::StartOver => {
+                self.selector.clear();
+                (self.making, self.made, self.gave_up) = (None, None, false);
+                Ok(())
+            }
+        }
+    }
+
+    /// Starts with the keyframes there are, if there are any.
+    fn begin(&mut self) -> anyhow::Result<()> {
+        if self.selector.keyframes().is_empty() {
+            return Ok(());
+        }
+        let keyframes = ids(&self.selector);
+        let job = AvatarJob::start(
+            (self.selector.keyframes().to_vec(), self.camera),
+            &self.body,
+            &self.settings,
+            self.clock,
+        )?;
+        self.gave_up = false;
+        self.making = Some(Making { job, frames_since_begun: 0, keyframes });
+        Ok(())
+    }
+
+    /// Waits for the avatar that was begun, if it is not there yet.
+    fn take_over(&mut self) -> anyhow::Result<()> {
+        let Some(Making { job, keyframes, .. }) = self.making.take() else {
+            return Ok(());
+        };
+        let FinishedAvatar { avatar, figures } = job.wait()?;
+        self.learned_from.extend(&keyframes);
+        self.figures.push(figures);
+        let driver = Driver::new(Arc::new(avatar), DriveConfig::default());
+        self.made = Some(Made { driver, frames_driven: 0, keyframes });
+        Ok(())
+    }
+}
+
+fn ids(selector: &KeyframeSelector) -> Vec<FrameId> {
+    let keyframes = selector.keyframes().iter();
+    keyframes.map(|keyframe| keyframe.frame.id()).collect()
 }

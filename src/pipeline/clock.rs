@@ -58,6 +58,16 @@ impl Timings {
             .push(spent.as_secs_f32() * 1e3);
     }
 
+    /// The median and the 95th percentile of a stage's latest times, in milliseconds.
+    pub(crate) fn recent(&self, stage: &str, count: usize) -> Option<(f32, f32)> {
+        let times = self.by_stage.get(stage)?;
+        let recent = &times[times.len().saturating_sub(count)..];
+        Some((
+            percentile(recent, 0.5)? as f32,
+            percentile(recent, 0.95)? as f32,
+        ))
+    }
+
     /// Takes over what another thread measured.
     pub(crate) fn merge(&mut self, other: Self) {
         for (stage, times) in other.by_stage {

@@ -26,14 +26,15 @@ pub(crate) fn run(
             break;
         };
         log.delivered(&frame);
-        let registered = tracking.process(&frame)?;
-        log.registered(&registered);
-        avatar.advance(&registered)?;
-        let mesh = avatar.drive(&registered);
-        outputs.frame(&frame, &registered, mesh.as_ref(), (avatar, &log))?;
+        let tracked = tracking.process(&frame)?;
+        let registered = &tracked.registered;
+        log.registered(&tracked);
+        let decided = avatar.advance(registered)?;
+        let mesh = avatar.drive(registered);
+        outputs.record(&frame, &decided)?;
+        outputs.frame(&frame, registered, mesh.as_ref(), (avatar, &log))?;
     }
     avatar.end()?;
-    log.timings.merge(tracking.timings);
     log.avatar_made(avatar);
     Ok(log)
 }

@@ -11,6 +11,8 @@ pub(crate) mod pictures;
 pub(crate) mod poses;
 pub(crate) mod publish;
 pub(crate) mod real_time;
+pub(crate) mod recorder;
 pub(crate) mod run_log;
+pub(crate) mod schedule;
 pub(crate) mod settings;
 pub(crate) mod track_stage;

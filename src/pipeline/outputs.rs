@@ -20,7 +20,9 @@ use super::{
     pictures::{first_picture, save_sheet},
     poses::PoseLog,
     publish::Publisher,
+    recorder::Recorder,
     run_log::{RunLog, TrackedSample},
+    schedule::Decision,
 };
 use crate::{cli::ChainArgs, progress::Progress};
 
@@ -41,6 +43,7 @@ pub(crate) struct Outputs {
     first_picture_done: bool,
     progress: Progress,
     publisher: Option<Publisher>,
+    recorder: Option<Recorder>,
 }
 
 impl Outputs {
@@ -70,6 +73,7 @@ impl Outputs {
             first_picture_done: false,
             progress: Progress::new("frames", frame_count),
             publisher: None,
+            recorder: None,
         })
     }
 
@@ -78,10 +82,30 @@ impl Outputs {
         self.publisher = Some(publisher);
     }
 
+    /// Records every frame too.
+    pub(crate) fn record_to(&mut self, recorder: Recorder) {
+        self.recorder = Some(recorder);
+    }
+
     /// A line for the person at the window.
     pub(crate) fn say(&self, line: &str) {
         if let Some(publisher) = &self.publisher {
             publisher.say(line);
+        }
+    }
+
+    /// Tells the window whether the source is held.
+    pub(crate) fn paused(&self, paused: bool) {
+        if let Some(publisher) = &self.publisher {
+            publisher.paused(paused);
+        }
+    }
+
+    /// Keeps a frame that went through the chain, and what was decided at it, so that a replay repeats both.
+    pub(crate) fn record(&self, frame: &Frame, decided: &[Decision]) -> anyhow::Result<()> {
+        match &self.recorder {
+            Some(recorder) => recorder.add(frame, decided),
+            None => Ok(()),
         }
     }
 
@@ -131,12 +155,15 @@ impl Outputs {
 
     /// Pictures, avatar file and GLB; the report is written by the command, last.
     pub(crate) fn finish(
-        &self,
+        &mut self,
         log: &RunLog,
         avatar: Option<&Arc<Avatar>>,
         truth: Option<&Truth>,
     ) -> anyhow::Result<()> {
         self.progress.finish();
+        if let Some(recorder) = self.recorder.take() {
+            recorder.finish()?;
+        }
         if let Some(publisher) = &self.publisher {
             publisher.finished();
         }

@@ -6,14 +6,14 @@ use effigy_avatar::AvatarMesh;
 use effigy_capture::{Calibration, Frame, Timestamp};
 use effigy_registration::{BodyModel, RegisteredFrame, Tracking, smpl::Poser};
 use effigy_viewer::{
-    AvatarView, BodyView, KeyframesView, PerformanceView, SnapshotSlot, SourceView, StageTiming,
-    TrackState, TrainingView,
+    AvatarView, BodyView, CauseCount, KeyframesView, PerformanceView, SnapshotSlot, SourceView,
+    StageTiming, TrackState, TrainingView,
 };
 
 use super::{
     avatar_stage::AvatarStage,
     clock::{Clock, percentile},
-    run_log::RunLog,
+    run_log::{RunLog, TOO_LATE},
 };
 use crate::machine::Machine;
 
@@ -90,15 +90,16 @@ impl Publisher {
             hint: "turn slowly".to_owned(),
         });
         let training = self.training(avatar);
-        let performance = self.performance(log);
+        let performance = self.performance(avatar, log);
         self.slot.update(|snapshot| {
             snapshot.frame = Some(Arc::new(frame.clone()));
             snapshot.clean = Some(Arc::clone(&registered.clean));
             snapshot.registered = Some(Arc::clone(registered));
             snapshot.body = body;
-            if mesh.is_some() {
+            if mesh.is_some() || avatar.avatar().is_none() {
                 snapshot.avatar = mesh;
             }
+            snapshot.playback = log.playback;
             snapshot.state = state;
             snapshot.keyframes = keyframes;
             snapshot.training = training;
@@ -139,7 +140,19 @@ impl Publisher {
         (view.running || view.avatars_made > 0).then(|| Arc::new(view.clone()))
     }
 
-    fn performance(&mut self, log: &RunLog) -> Option<PerformanceView> {
+    /// A recording's play button shows the other wish.
+    pub(crate) fn paused(&self, paused: bool) {
+        let shown = self.slot.latest().playback;
+        if shown.is_some_and(|playback| playback.paused != paused) {
+            self.slot.update(|snapshot| {
+                if let Some(playback) = &mut snapshot.playback {
+                    playback.paused = paused;
+                }
+            });
+        }
+    }
+
+    fn performance(&mut self, avatar: &AvatarStage, log: &RunLog) -> Option<PerformanceView> {
         self.frames += 1;
         if !self.frames.is_multiple_of(FIGURES_EVERY) {
             return None;
@@ -147,26 +160,30 @@ impl Publisher {
         let now = self.clock.secs();
         let frames_per_sec = FIGURES_EVERY as f64 / (now - self.figures_at).max(1e-3);
         self.figures_at = now;
-        let first = log.latencies_ms.len().saturating_sub(RECENT);
-        let recent: Vec<f32> = log.latencies_ms[first..]
+        let first = log.latencies.len().saturating_sub(RECENT);
+        let recent: Vec<f32> = log.latencies[first..]
             .iter()
-            .map(|(ms, _)| *ms)
+            .map(|latency| latency.milliseconds)
             .collect();
         let of = |share| percentile(&recent, share).unwrap_or(0.0) as f32;
-        let stages =
-            [
-                StageTiming {
-                    name: "frame to avatar".to_owned(),
-                    p50_ms: of(0.5),
-                    p95_ms: of(0.95),
-                },
-            ];
+        let stages = [
+            ("clean", &log.timings),
+            ("track", &log.timings),
+            ("keyframes", &avatar.timings),
+            ("drive", &avatar.timings),
+        ];
+        let stages = stages.into_iter().filter_map(|(name, timings)| {
+            let (p50_ms, p95_ms) = timings.recent(name, RECENT)?;
+            Some(StageTiming { name: name.to_owned(), p50_ms, p95_ms })
+        });
+        let drops = (log.dropped_so_far > 0)
+            .then(|| CauseCount { cause: TOO_LATE.to_owned(), count: log.dropped_so_far });
         Some(PerformanceView {
             frames_per_sec: frames_per_sec as f32,
             latency_p50_ms: of(0.5),
             latency_p95_ms: of(0.95),
-            stages: stages.into(),
-            drops: Vec::new(),
+            stages: stages.collect(),
+            drops: drops.into_iter().collect(),
         })
     }
 }

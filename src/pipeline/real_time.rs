@@ -9,17 +9,21 @@ use std::{
 
 use anyhow::Context as _;
 use crossbeam::channel::{Receiver, RecvTimeoutError, Sender, TrySendError, bounded};
-use effigy_capture::{Frame, FrameSource, Timestamp};
-use effigy_registration::{BodyModel, RegisteredFrame};
+use effigy_capture::{
+    Frame, FrameSource, Timestamp,
+    replay::{Due, Pacer},
+};
+use effigy_registration::BodyModel;
+use effigy_viewer::PlaybackView;
 
 use super::{
     avatar_stage::AvatarStage,
-    clock::{Clock, Timings},
+    clock::Clock,
     controls::Controls,
     outputs::Outputs,
     run_log::RunLog,
     settings::Settings,
-    track_stage::TrackStage,
+    track_stage::{TrackStage, TrackedFrame},
 };
 use crate::interrupt;
 
@@ -32,12 +36,15 @@ const COMMANDS_EVERY: Duration = Duration::from_millis(50);
 struct Delivered {
     frame: Frame,
     at: Duration,
+    /// The frame before this one was not the one before it in the source.
+    jumped: bool,
+    dropped_so_far: u64,
+    playback: Option<PlaybackView>,
 }
 
 struct Tracked {
-    frame: Frame,
-    at: Duration,
-    registered: Arc<RegisteredFrame>,
+    delivered: Delivered,
+    tracked: TrackedFrame,
 }
 
 /// Takes a source to its end (or to Ctrl-C) in real time.
@@ -67,12 +74,11 @@ pub(crate) fn run(
         let driven = drive(&tracked, avatar, outputs, (&mut log, controls));
         // Closes the queue, so that the threads before it end too.
         drop(tracked);
-        let timings = joined(track)?;
+        joined(track)?;
         let captured = joined(capture)?;
         driven?;
         log.delivered = captured.delivered;
-        log.drop_frames("tracking was busy", captured.dropped);
-        log.timings.merge(timings);
+        log.dropped_by_us(captured.dropped);
         anyhow::Ok(())
     })?;
     avatar.end()?;
@@ -99,24 +105,36 @@ fn capture(
     (clock, controls): (Clock, &Controls),
 ) -> anyhow::Result<Captured> {
     let mut captured = Captured::default();
-    let mut start: Option<(Timestamp, Duration)> = None;
+    let mut pacer = Pacer::new(1.0);
+    let mut before: Option<Timestamp> = None;
     while !interrupt::requested() {
+        let steered = controls.steer(source);
+        if steered.waited || steered.jumped {
+            pacer.restart();
+        }
         let Some(frame) = source.next_frame()? else {
             break;
         };
-        let (first, began) = start.get_or_insert((frame.timestamp, clock.now()));
-        *began += controls.wait_while_paused();
-        let (first, began) = (*first, *began);
-        let due = began + Duration::from_secs_f64((frame.timestamp - first).max(0.0));
-        thread::sleep(due.saturating_sub(clock.now()));
+        let looped = before.is_some_and(|before| frame.timestamp < before);
+        before = Some(frame.timestamp);
+        let at = wait_until_due(&mut pacer, frame.timestamp, clock);
         captured.delivered += 1;
-        let mut item = Delivered { frame, at: clock.now().max(due) };
+        let mut item = Delivered {
+            frame,
+            at,
+            jumped: steered.jumped || looped,
+            dropped_so_far: captured.dropped,
+            playback: controls.playback(source.player()),
+        };
         loop {
             match to_track.try_send(item) {
                 Ok(()) => break,
                 Err(TrySendError::Full(back)) => {
                     item = back;
-                    captured.dropped += u64::from(waiting.try_recv().is_ok());
+                    if let Ok(stale) = waiting.try_recv() {
+                        captured.dropped += 1;
+                        item.jumped |= stale.jumped;
+                    }
                 }
                 Err(TrySendError::Disconnected(_)) => return Ok(captured),
             }
@@ -125,18 +143,29 @@ fn capture(
     Ok(captured)
 }
 
+/// Returns when the frame was due: what is late from here on is our doing, or the source's.
+fn wait_until_due(pacer: &mut Pacer, frame: Timestamp, clock: Clock) -> Duration {
+    if let Due::Wait(early) = pacer.due(frame, clock.now()) {
+        thread::sleep(early);
+    }
+    clock.now()
+}
+
 fn track(
     mut tracking: TrackStage,
     frames: &Receiver<Delivered>,
     to_drive: &Sender<Tracked>,
-) -> anyhow::Result<Timings> {
-    for Delivered { frame, at } in frames {
-        let registered = tracking.process(&frame)?;
-        if to_drive.send(Tracked { frame, at, registered }).is_err() {
+) -> anyhow::Result<()> {
+    for delivered in frames {
+        if delivered.jumped {
+            tracking.jumped();
+        }
+        let tracked = tracking.process(&delivered.frame)?;
+        if to_drive.send(Tracked { delivered, tracked }).is_err() {
             break;
         }
     }
-    Ok(tracking.timings)
+    Ok(())
 }
 
 fn drive(
@@ -147,18 +176,23 @@ fn drive(
 ) -> anyhow::Result<()> {
     loop {
         controls.obey(avatar, outputs)?;
-        let Tracked { frame, at, registered } = match tracked.recv_timeout(COMMANDS_EVERY) {
+        outputs.paused(controls.paused());
+        let Tracked { delivered, tracked } = match tracked.recv_timeout(COMMANDS_EVERY) {
             Ok(next) => next,
             Err(RecvTimeoutError::Timeout) => continue,
             Err(RecvTimeoutError::Disconnected) => return Ok(()),
         };
-        let tuning = avatar.is_making();
-        log.delivered(&frame);
-        avatar.advance(&registered)?;
-        let mesh = avatar.drive(&registered);
-        let latency = log.clock.now().saturating_sub(at);
-        log.latencies_ms.push((latency.as_secs_f32() * 1e3, tuning));
-        log.registered(&registered);
-        outputs.frame(&frame, &registered, mesh.as_ref(), (avatar, log))?;
+        let was_making = avatar.is_making();
+        let registered = &tracked.registered;
+        log.delivered(&delivered.frame);
+        log.dropped_so_far = delivered.dropped_so_far;
+        log.playback = delivered.playback;
+        let decided = avatar.advance(registered)?;
+        let mesh = avatar.drive(registered);
+        let latency = log.clock.now().saturating_sub(delivered.at);
+        log.latency(latency, (was_making, mesh.is_some()));
+        log.registered(&tracked);
+        outputs.record(&delivered.frame, &decided)?;
+        outputs.frame(&delivered.frame, registered, mesh.as_ref(), (avatar, log))?;
     }
 }

@@ -1,19 +1,27 @@
 //! What a run did, frame by frame: counts, times, and what evaluation needs afterwards.
 
-use std::collections::BTreeMap;
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    time::Duration,
+};
 
 use effigy_capture::{Frame, FrameId, Rigid3, Timestamp};
-use effigy_registration::{BodyParams, RegisteredFrame};
+use effigy_registration::{BodyParams, RegisteredFrame, Tracking};
+use effigy_viewer::PlaybackView;
 use glam::Vec3;
 
 use super::{
     avatar_job::JobFigures,
     avatar_stage::AvatarStage,
     clock::{Clock, Timings},
+    track_stage::TrackedFrame,
 };
 
 /// Points kept of each tracked frame to measure distances with.
 const POINTS_PER_FRAME: usize = 1500;
+
+/// Why a frame was not looked at.
+pub(crate) const TOO_LATE: &str = "tracking was busy";
 
 /// A tracked frame, reduced to what evaluation needs.
 #[derive(Clone, Debug)]
@@ -25,17 +33,32 @@ pub(crate) struct TrackedSample {
     pub(crate) points_in_camera: Vec<Vec3>,
 }
 
+/// From delivery to result, and what ran beside it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct FrameLatency {
+    pub(crate) milliseconds: f32,
+    pub(crate) fine_tuning: bool,
+    pub(crate) driving: bool,
+}
+
 /// The record of one run.
 pub(crate) struct RunLog {
     pub(crate) delivered: u64,
     pub(crate) tracked: Vec<TrackedSample>,
+    pub(crate) partial: u64,
+    pub(crate) lost: u64,
     pub(crate) dropped: BTreeMap<String, u64>,
     pub(crate) keyframes: Vec<FrameId>,
-    pub(crate) job: Option<JobFigures>,
+    /// What making each avatar took, the first one first.
+    pub(crate) jobs: Vec<JobFigures>,
     pub(crate) timings: Timings,
-    /// Milliseconds from delivery to result, and whether fine-tuning ran beside it.
-    pub(crate) latencies_ms: Vec<(f32, bool)>,
+    pub(crate) latencies: Vec<FrameLatency>,
+    /// Frames that came too late to be looked at.
+    pub(crate) dropped_so_far: u64,
+    /// Where a recording stands.
+    pub(crate) playback: Option<PlaybackView>,
     pub(crate) clock: Clock,
+    learned_from: BTreeSet<FrameId>,
     first_frame: Option<Timestamp>,
     first_track: Option<Timestamp>,
     frames_since_first_track: u64,
@@ -46,12 +69,17 @@ impl RunLog {
         Self {
             delivered: 0,
             tracked: Vec::new(),
+            partial: 0,
+            lost: 0,
             dropped: BTreeMap::new(),
             keyframes: Vec::new(),
-            job: None,
+            jobs: Vec::new(),
             timings: Timings::default(),
-            latencies_ms: Vec::new(),
+            latencies: Vec::new(),
+            dropped_so_far: 0,
+            playback: None,
             clock,
+            learned_from: BTreeSet::new(),
             first_frame: None,
             first_track: None,
             frames_since_first_track: 0,
@@ -63,7 +91,21 @@ impl RunLog {
         self.first_frame.get_or_insert(frame.timestamp);
     }
 
-    pub(crate) fn registered(&mut self, registered: &RegisteredFrame) {
+    pub(crate) fn latency(&mut self, latency: Duration, (fine_tuning, driving): (bool, bool)) {
+        let milliseconds = latency.as_secs_f32() * 1e3;
+        self.latencies
+            .push(FrameLatency { milliseconds, fine_tuning, driving });
+    }
+
+    pub(crate) fn registered(&mut self, tracked: &TrackedFrame) {
+        self.timings.add("clean", tracked.clean_took);
+        self.timings.add("track", tracked.track_took);
+        let registered = &tracked.registered;
+        match registered.tracking {
+            Tracking::Tracked { .. } => {}
+            Tracking::Partial { .. } => self.partial += 1,
+            Tracking::Lost { .. } => self.lost += 1,
+        }
         if let Some(params) = registered.params() {
             self.first_track.get_or_insert(registered.clean.timestamp);
             self.tracked.push(TrackedSample {
@@ -76,16 +118,19 @@ impl RunLog {
         self.frames_since_first_track += u64::from(self.first_track.is_some());
     }
 
-    pub(crate) fn drop_frames(&mut self, cause: &str, count: u64) {
+    /// Frames that made way for newer ones.
+    pub(crate) fn dropped_by_us(&mut self, count: u64) {
+        self.dropped_so_far = count;
         if count > 0 {
-            *self.dropped.entry(cause.to_owned()).or_default() += count;
+            self.dropped.insert(TOO_LATE.to_owned(), count);
         }
     }
 
     /// Takes over what the avatar stage knows at the end.
     pub(crate) fn avatar_made(&mut self, avatar: &mut AvatarStage) {
         self.keyframes = avatar.keyframe_ids();
-        self.job = avatar.figures();
+        self.jobs = avatar.figures().to_vec();
+        self.learned_from.clone_from(avatar.learned_from());
         self.timings.merge(std::mem::take(&mut avatar.timings));
     }
 
@@ -100,11 +145,11 @@ impl RunLog {
         (frames > 0).then(|| self.tracked.len() as f64 / frames as f64)
     }
 
-    /// Tracked frames that fine-tuning did not learn from.
+    /// Tracked frames that no avatar learned from.
     pub(crate) fn unseen(&self) -> impl Iterator<Item = &TrackedSample> {
         self.tracked
             .iter()
-            .filter(|sample| !self.keyframes.contains(&sample.id))
+            .filter(|sample| !self.learned_from.contains(&sample.id))
     }
 }
 

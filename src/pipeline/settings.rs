@@ -29,12 +29,16 @@ pub(crate) struct ScheduleConfig {
     /// In a replay an avatar takes over this many frames after it was asked for; the replay waits
     /// there if need be, so that two replays are the same.
     pub(crate) swap_after_frames: u64,
+    /// An avatar is made better when this many of its keyframes have given way to others...
+    pub(crate) improve_new_keyframes: usize,
+    /// ...and it has been driven for this long.
+    pub(crate) improve_after_frames: u64,
 }
 
 impl Default for ScheduleConfig {
     fn default() -> Self {
         // Three seconds at 30 Hz: long enough that fine-tuning has the chain's idle time to itself.
-        Self { swap_after_frames: 90 }
+        Self { swap_after_frames: 90, improve_new_keyframes: 3, improve_after_frames: 150 }
     }
 }
 

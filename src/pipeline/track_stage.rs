@@ -1,22 +1,25 @@
 //! From a raw frame to a tracked body: cleaning and tracking, timed.
 
-use std::sync::Arc;
+use std::{sync::Arc, time::Duration};
 
 use anyhow::Context as _;
 use effigy_capture::{Calibration, Frame};
 use effigy_fusion::clean::Cleaner;
 use effigy_registration::{BodyModel, RegisteredFrame, track::Tracker};
 
-use super::{
-    clock::{Clock, Timings},
-    settings::Settings,
-};
+use super::{clock::Clock, settings::Settings};
 
 pub(crate) struct TrackStage {
     cleaner: Cleaner,
     tracker: Tracker,
     clock: Clock,
-    pub(crate) timings: Timings,
+}
+
+/// A tracked frame and what it took.
+pub(crate) struct TrackedFrame {
+    pub(crate) registered: Arc<RegisteredFrame>,
+    pub(crate) clean_took: Duration,
+    pub(crate) track_took: Duration,
 }
 
 impl TrackStage {
@@ -32,18 +35,26 @@ impl TrackStage {
             cleaner: Cleaner::new(calibration.clone(), settings.clean.clone()),
             tracker: Tracker::new(body, camera, settings.track.clone(), world_from_camera),
             clock,
-            timings: Timings::default(),
         }
     }
 
-    pub(crate) fn process(&mut self, frame: &Frame) -> anyhow::Result<Arc<RegisteredFrame>> {
+    /// The next frame is not the one after the last: a recording was taken up elsewhere.
+    pub(crate) fn jumped(&mut self) {
+        self.tracker.forget_pose();
+    }
+
+    pub(crate) fn process(&mut self, frame: &Frame) -> anyhow::Result<TrackedFrame> {
+        let start = self.clock.now();
         let clean = self
-            .timings
-            .time(&self.clock, "clean", || self.cleaner.process(frame))
+            .cleaner
+            .process(frame)
             .with_context(|| format!("frame {}", frame.id.0))?;
-        let registered = self.timings.time(&self.clock, "track", || {
-            self.tracker.process(Arc::new(clean))
-        });
-        Ok(Arc::new(registered))
+        let cleaned = self.clock.now();
+        let registered = Arc::new(self.tracker.process(Arc::new(clean)));
+        Ok(TrackedFrame {
+            registered,
+            clean_took: cleaned.saturating_sub(start),
+            track_took: self.clock.now().saturating_sub(cleaned),
+        })
     }
 }

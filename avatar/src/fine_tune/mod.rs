@@ -4,12 +4,10 @@
 //! stage reads no clock: the caller passes one in.
 
 mod config;
-mod job;
 pub(crate) mod sampling;
 mod step;
 #[cfg(test)]
 mod tests;
 
 pub use config::{FineTuneConfig, SamplingConfig};
-pub use job::FineTuneJob;
 pub use step::{FineTuneProgress, FineTuner, fine_tune};

@@ -6,9 +6,7 @@ use effigy_registration::smpl::{JOINT_COUNT, rotation_from_axis_angle};
 use glam::Vec3;
 use rand::{SeedableRng as _, rngs::StdRng};
 
-use super::{
-    FineTuneConfig, FineTuneJob, FineTuner, SamplingConfig, fine_tune, sampling::random_in_box,
-};
+use super::{FineTuneConfig, FineTuner, SamplingConfig, fine_tune, sampling::random_in_box};
 use crate::{
     AvatarError, CanonicalSamples, PoseInput, SignedDistanceField as _,
     hyper::{HeadKind, HyperConfig, HyperNetwork},
@@ -123,18 +121,6 @@ fn points_of_weight_zero_are_never_drawn() {
     let mut ignore = |_: &_| ControlFlow::Continue(());
     let with = fine_tune(network(), &spoiled, 1.0, &config, &|| 0.0, &mut ignore).unwrap();
     assert_eq!(with, learned(&config));
-}
-
-#[test]
-fn a_job_reports_its_progress_and_can_be_stopped() {
-    let config = FineTuneConfig { steps: 1_000_000, ..config() };
-    let job = FineTuneJob::start(network(), keyframes(), 1.0, config, || 0.0, || {}).unwrap();
-    while job.progress().step < 2 {
-        std::thread::yield_now();
-    }
-    assert!(job.progress().loss.total().is_finite());
-    job.cancel();
-    assert_ne!(job.finish().unwrap(), network());
 }
 
 #[test]

@@ -109,6 +109,11 @@ impl Player {
         index.is_some()
     }
 
+    /// What comes after the last frame from now on.
+    pub fn repeat(&mut self, repeat: Repeat) {
+        self.repeat = repeat;
+    }
+
     /// The index of the frame that comes next.
     pub fn position(&self) -> usize {
         self.next
@@ -188,5 +193,9 @@ impl FrameSource for Player {
             Repeat::Once => Some(self.recording.frame_count() as u64),
             Repeat::Loop => None,
         }
+    }
+
+    fn player(&mut self) -> Option<&mut Player> {
+        Some(self)
     }
 }
