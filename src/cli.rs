@@ -50,6 +50,9 @@ pub(crate) enum Command {
         after_help = "Example: effigy train prior --out avatar/assets/prior_live.safetensors"
     )]
     Train(TrainArgs),
+    /// Measure how good a part of the program is, on a fixed suite
+    #[command(after_help = "Example: effigy evaluate tracking --quick --json tracking.json")]
+    Evaluate(EvaluateArgs),
 }
 
 impl Default for Command {
@@ -223,4 +226,38 @@ pub(crate) struct TrainPriorArgs {
     /// Go on from the checkpoint beside the output
     #[arg(long)]
     pub(crate) resume: bool,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct EvaluateArgs {
+    #[command(subcommand)]
+    pub(crate) what: EvaluateWhat,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum EvaluateWhat {
+    /// How well bodies are found and followed: simulated people that nothing was tuned on
+    Tracking(EvaluateTrackingArgs),
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct EvaluateTrackingArgs {
+    /// Write all figures here
+    #[arg(long, value_name = "FILE")]
+    pub(crate) json: PathBuf,
+    /// One person, two outfits, the beginning of each movement
+    #[arg(long)]
+    pub(crate) quick: bool,
+    /// Other people than the test split's: tune on these, never on those
+    #[arg(long, value_name = "SEED", value_delimiter = ',')]
+    pub(crate) people: Vec<u64>,
+    /// Only these sensors
+    #[arg(long, value_delimiter = ',', value_parser = named::<SensorPreset>)]
+    pub(crate) sensor: Vec<SensorPreset>,
+    /// Only these outfits
+    #[arg(long, value_delimiter = ',', value_parser = named::<OutfitKind>)]
+    pub(crate) outfit: Vec<OutfitKind>,
+    /// Settings of the stages (TOML); what it does not name keeps its default
+    #[arg(long, value_name = "FILE")]
+    pub(crate) config: Option<PathBuf>,
 }

@@ -52,5 +52,6 @@ fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Info(args) => commands::info::run(&args),
         Command::Export(args) => commands::export::run(&args),
         Command::Train(args) => commands::train::run(&args),
+        Command::Evaluate(args) => commands::evaluate::run(&args),
     }
 }

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     correspond::{
-        Agreement, Contradictions, MatchConfig, Renderer, Visibility, contradictions, match_points,
+        Agreement, Contradictions, MatchConfig, Matcher, Renderer, Visibility, contradictions,
     },
     observe::{DataPoint, Observation},
     prior::surprise,
@@ -30,6 +30,10 @@ pub struct EnergyConfig {
     /// Where people wear clothes, depth is expected this far off the skin. A shape that only stays inside
     /// the clothes would grow into them: girth explains an even layer as well as cloth does.
     pub cloth_standoff_m: f32,
+    /// Hair stands off the skull by this.
+    pub hair_m: f32,
+    /// Shoes lift bare feet off the floor by this.
+    pub sole_m: f32,
     /// A depth point this far outside the body costs one: clothes stand off the skin by this order.
     pub cloth_outside_m: f32,
     /// A depth point this far inside the body costs one: clothes are never there, noise and model errors are.
@@ -62,6 +66,8 @@ impl Default for EnergyConfig {
         Self {
             data_weight: 400.0,
             cloth_standoff_m: 0.010,
+            hair_m: 0.0,
+            sole_m: 0.0,
             cloth_outside_m: 0.020,
             cloth_inside_m: 0.008,
             outlier_m: 0.08,
@@ -143,6 +149,7 @@ impl Aligned {
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Evidence {
     pub(crate) matches: Vec<Match>,
+    matcher: Matcher,
     contradictions: Contradictions,
     floor_vertices: Vec<u32>,
     point_count: usize,
@@ -214,7 +221,8 @@ impl Evidence {
             oblique: energy.oblique,
         };
         self.point_count = points.len();
-        match_points(points, body, visibility, matching, &mut self.matches);
+        self.matcher
+            .match_points(points, body, visibility, matching, &mut self.matches);
         let slack_cells = slack_cells(observation, energy);
         contradictions(
             body,
@@ -245,6 +253,7 @@ impl Evidence {
                 outlier: energy.outlier_m * widen,
             },
             standoff_m: energy.cloth_standoff_m,
+            hair_m: energy.hair_m,
             weight: energy.data_weight / self.point_count.max(1) as f32,
         };
         let per_vertex = energy.contradiction_weight / 1000.0;
@@ -265,8 +274,12 @@ impl Evidence {
             outlier_m: 0.3,
             weight: 0.5 * per_vertex,
         };
-        let floor =
-            FloorTerm { vertices: &self.floor_vertices, sigma_m: energy.floor_m, weight: 0.05 };
+        let floor = FloorTerm {
+            vertices: &self.floor_vertices,
+            sole_m: energy.sole_m,
+            sigma_m: energy.floor_m,
+            weight: 0.05,
+        };
         let prior = PosePrior { weight: energy.pose_prior_weight };
         let limits = JointLimits { sigma_rad: energy.joint_limit_rad };
         let temporal = context.predicted.map(|predicted| Temporal {

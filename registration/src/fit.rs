@@ -52,6 +52,7 @@ pub(crate) struct ShapeFit {
     last_stored_secs: f32,
     next_moment: usize,
     running: Option<Estimate>,
+    confidence: [f32; BETA_COUNT],
 }
 
 #[derive(Clone, Debug)]
@@ -85,7 +86,13 @@ impl ShapeFit {
             last_stored_secs: f32::MIN,
             next_moment: 0,
             running: None,
+            confidence: [0.0; BETA_COUNT],
         }
+    }
+
+    /// For each beta how much of the population's variance the frames have ruled out: 0 is a guess, 1 is certain.
+    pub(crate) fn confidence(&self) -> [f32; BETA_COUNT] {
+        self.confidence
     }
 
     /// Whether the betas stay as they are from now on.
@@ -165,13 +172,14 @@ impl ShapeFit {
     fn round(&mut self, config: &FitConfig, context: &Context<'_>) {
         if let Some(running) = &mut self.running {
             running.rounds_done += 1;
-            round(
+            let confidence = round(
                 &self.surface,
                 &mut self.views,
                 &mut running.betas,
                 config,
                 context,
             );
+            self.confidence = confidence.unwrap_or(self.confidence);
         }
     }
 }
@@ -192,14 +200,15 @@ pub(crate) fn fit_one(
     views[0].state
 }
 
-/// One Gauss-Newton step of all poses and the betas: each pose is eliminated from its frame's system.
+/// One Gauss-Newton step of all poses and the betas: each pose is eliminated from its frame's system. Returns
+/// how certain the betas are then.
 fn round(
     surface: &Arc<Surface>,
     views: &mut [StoredView],
     betas: &mut [f32; BETA_COUNT],
     config: &FitConfig,
     context: &Context<'_>,
-) {
+) -> Option<[f32; BETA_COUNT]> {
     let shaped = ShapedSurface::new(surface, *betas);
     let mut sum = NormalEquations::new(BETA_COUNT);
     let mut eliminated = Vec::with_capacity(views.len());
@@ -215,9 +224,7 @@ fn round(
         eliminated.push(part);
     }
     sum.add(&prior(&shaped, *betas, config));
-    let Some(mut betas_step) = sum.solve(RELATIVE_DAMPING, 1e-6) else {
-        return;
-    };
+    let mut betas_step = sum.solve(RELATIVE_DAMPING, 1e-6)?;
     shorten(&mut betas_step);
     for (beta, &step) in betas.iter_mut().zip(&betas_step) {
         *beta = (*beta + step as f32).clamp(-MOST_UNUSUAL, MOST_UNUSUAL);
@@ -230,6 +237,12 @@ fn round(
         }
         view.state.betas = *betas;
     }
+    let variances = sum.variances()?;
+    // The prior alone would leave a variance of one over its weight.
+    let left = |beta: usize| variances[beta] as f32 * config.shape_prior_weight;
+    Some(std::array::from_fn(|beta| {
+        (1.0 - left(beta)).clamp(0.0, 1.0)
+    }))
 }
 
 /// Betas, in standard deviations, beyond which the fit has gone wrong rather than met somebody rare.

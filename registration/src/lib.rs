@@ -6,6 +6,7 @@
 pub mod error;
 pub mod motion;
 pub mod registered;
+pub mod smooth;
 pub mod smpl;
 pub mod track;
 
@@ -27,5 +28,6 @@ pub use error::RegistrationError;
 pub use fit::FitConfig;
 pub use initialize::InitializeConfig;
 pub use registered::{RegisteredFrame, Tracking};
+pub use smooth::{SmoothConfig, Smoother};
 pub use smpl::{BodyModel, BodyParams, PosedBody};
 pub use track::{TrackConfig, Tracker};

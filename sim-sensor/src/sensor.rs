@@ -52,19 +52,34 @@ impl SimulatedSensor {
         let view = self
             .renderer
             .render(&mesh, &person.paint, &person.body.skinning);
-        let raw = match self.scene.scenario.noise {
-            Noise::Sensor => self.exposure.expose(view, self.scene.scenario.seed, id),
-            Noise::None => self.exposure.truth(view),
+        Self::delivered(&self.scene, &mut self.exposure, view, id)
+    }
+
+    /// The same moment's frame with nobody in the room.
+    pub fn expose_room(&mut self, id: FrameId) -> Result<Frame, CaptureError> {
+        let view = self.renderer.render_room();
+        Self::delivered(&self.scene, &mut self.exposure, view, id)
+    }
+
+    fn delivered(
+        scene: &Scene,
+        exposure: &mut noise::Exposure,
+        view: &View,
+        id: FrameId,
+    ) -> Result<Frame, CaptureError> {
+        let raw = match scene.scenario.noise {
+            Noise::Sensor => exposure.expose(view, scene.scenario.seed, id),
+            Noise::None => exposure.truth(view),
         };
         let (width, height) = (view.width as u32, view.height as u32);
-        let color = if self.scene.scenario.color {
+        let color = if scene.scenario.color {
             Some(Arc::new(ColorImage::new(width, height, view.shaded())?))
         } else {
             None
         };
         Ok(Frame {
             id,
-            timestamp: self.scene.timestamp(id),
+            timestamp: scene.timestamp(id),
             depth: Arc::new(DepthImage::new(width, height, raw)?),
             color,
         })

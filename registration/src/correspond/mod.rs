@@ -6,5 +6,5 @@ mod nearest;
 mod visibility;
 
 pub(crate) use contradict::{Contradictions, contradictions};
-pub(crate) use nearest::{MatchConfig, match_points};
+pub(crate) use nearest::{MatchConfig, Matcher};
 pub(crate) use visibility::{Agreement, Renderer, Visibility};

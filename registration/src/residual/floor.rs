@@ -1,14 +1,15 @@
-//! Feet do not go through the floor, which is at y = 0.
+//! Feet do not go through the floor, which is at y = 0, nor through the soles under them.
 
 use glam::Vec3;
 
 use super::{Row, RowSink, Term};
 use crate::surface::PosedSurface;
 
-/// `sum w min(0, y)^2` over the vertices of ankles and feet.
+/// `sum w min(0, y - sole)^2` over the vertices of ankles and feet.
 #[derive(Clone, Debug)]
 pub(crate) struct FloorTerm<'a> {
     pub(crate) vertices: &'a [u32],
+    pub(crate) sole_m: f32,
     pub(crate) sigma_m: f32,
     pub(crate) weight: f32,
 }
@@ -18,7 +19,7 @@ impl Term for FloorTerm<'_> {
         let mut row = Row::new(0.0, 0.0);
         let weight = self.weight / (self.sigma_m * self.sigma_m);
         for &vertex in self.vertices {
-            let below_m = body.vertices[vertex as usize].y.min(0.0);
+            let below_m = (body.vertices[vertex as usize].y - self.sole_m).min(0.0);
             row.restart(below_m, weight, weight * below_m * below_m);
             if sink.wants_derivatives() {
                 if below_m == 0.0 {
@@ -43,6 +44,11 @@ mod tests {
         let below: Vec<u32> = (0..body.vertices.len() as u32)
             .filter(|&v| body.vertices[v as usize].y < -0.02)
             .collect();
-        checker::assert_derivatives(&FloorTerm { vertices: &below, sigma_m: 0.01, weight: 1.0 });
+        checker::assert_derivatives(&FloorTerm {
+            vertices: &below,
+            sole_m: 0.01,
+            sigma_m: 0.01,
+            weight: 1.0,
+        });
     }
 }

@@ -25,6 +25,8 @@ pub(crate) struct PointToPlane<'a> {
     pub(crate) cloth: ClothSide,
     /// How far clothes stand off the skin on average, where there are any.
     pub(crate) standoff_m: f32,
+    /// The same of hair.
+    pub(crate) hair_m: f32,
     /// How many independent measurements one match is worth: neighbours share their errors.
     pub(crate) weight: f32,
 }
@@ -34,7 +36,9 @@ impl Term for PointToPlane<'_> {
         let mut row = Row::new(0.0, 0.0);
         for found in self.matches {
             let vertex = found.vertex as usize;
-            let standoff_m = self.standoff_m * body.shaped.surface.clothed[vertex];
+            let surface = &body.shaped.surface;
+            let standoff_m =
+                self.standoff_m * surface.clothed[vertex] + self.hair_m * surface.hairy[vertex];
             let distance_m = found.normal.dot(found.point - body.vertices[vertex]) - standoff_m;
             let (weight, cost) = self.cloth.weight_and_cost(distance_m, found.sigma_m);
             let scale = self.weight * found.trust;
@@ -71,6 +75,7 @@ mod tests {
             matches: &matches,
             cloth,
             standoff_m: 0.01,
+            hair_m: 0.008,
             weight: 1.0,
         });
     }

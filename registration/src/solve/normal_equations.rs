@@ -46,6 +46,16 @@ impl NormalEquations {
         step.iter().all(|x| x.is_finite()).then_some(step)
     }
 
+    /// The diagonal of the inverse: how uncertain each unknown is once the others are free; `None` if that is
+    /// not positive definite.
+    pub(crate) fn variances(&self) -> Option<Vec<f64>> {
+        let n = self.unknowns;
+        let factor = self.damped(n, 0.0, 0.0).llt(Side::Lower).ok()?;
+        let inverse = factor.solve(&Mat::<f64>::identity(n, n));
+        let variances: Vec<f64> = (0..n).map(|i| inverse[(i, i)]).collect();
+        variances.iter().all(|v| v.is_finite()).then_some(variances)
+    }
+
     /// The Schur complement of the first unknowns, which are damped.
     pub(crate) fn eliminate(
         &self,
@@ -206,6 +216,20 @@ mod tests {
         let first = eliminated.first_step(&rest);
         for (a, b) in whole.iter().zip(first.iter().chain(&rest)) {
             assert!((a - b).abs() < 1e-9, "{a} {b}");
+        }
+    }
+
+    #[test]
+    fn variances_are_the_inverse_squared_sigmas_of_independent_unknowns() {
+        let mut system = NormalEquations::new(3);
+        for (axis, weight) in [4.0, 0.25, 1.0].into_iter().enumerate() {
+            let mut row = Row::new(0.0, weight);
+            row.add(0, Vec3::AXES[axis]);
+            system.take(&row);
+        }
+        let variances = system.variances().unwrap();
+        for (found, expected) in variances.into_iter().zip([0.25, 4.0, 1.0]) {
+            assert!((found - expected).abs() < 1e-12);
         }
     }
 

@@ -29,6 +29,8 @@ pub(crate) struct Surface {
     pub(crate) pose_dirs: Vec<PoseDirection>,
     /// For each vertex the share of it that clothes cover on most people: all but head, hands and feet.
     pub(crate) clothed: Vec<f32>,
+    /// For each vertex 1 where most people have hair, else 0.
+    pub(crate) hairy: Vec<f32>,
 }
 
 /// Neck, head, wrists, hands, ankles and feet.
@@ -40,6 +42,31 @@ fn clothed_share(weights: &VertexWeights) -> f32 {
         .filter(|(bone, _)| !BARE_BONES.contains(bone))
         .map(|(_, weight)| weight)
         .sum()
+}
+
+/// 1 on the crown and the back of the head, else 0.
+fn hairy(model: &BodyModel, vertices: &[u32], skinning: &[VertexWeights]) -> Vec<f32> {
+    const HEAD: u8 = 15;
+    /// Of the way from the head's joint to the crown: where the forehead ends, and where the neck does.
+    const FOREHEAD: f32 = 0.7;
+    const NAPE: f32 = 0.2;
+    let joint = model.joints(&model.template)[HEAD as usize];
+    let crown_y = model.template.iter().map(|v| v.y).fold(f32::MIN, f32::max);
+    let has_hair = |(&vertex, weights): (&u32, &VertexWeights)| {
+        let bones = weights.bones.iter().zip(&weights.weights);
+        let on_head: f32 = bones
+            .filter(|(bone, _)| **bone == HEAD)
+            .map(|(_, weight)| weight)
+            .sum();
+        let place = model.template[vertex as usize];
+        let up = (place.y - joint.y) / (crown_y - joint.y);
+        on_head > 0.8 && (up > FOREHEAD || (up > NAPE && place.z < joint.z))
+    };
+    vertices
+        .iter()
+        .zip(skinning)
+        .map(|v| f32::from(u8::from(has_hair(v))))
+        .collect()
 }
 
 /// The joints that move a vertex, in ascending order, each with a mask of the vertex's bones it carries.
@@ -63,11 +90,13 @@ impl Surface {
             .map(|&v| model.skinning[v as usize])
             .collect();
         let clothed = skinning.iter().map(clothed_share).collect();
+        let hairy = hairy(&model, &coarse.vertices, &skinning);
         let influences = skinning.iter().map(Influences::new).collect();
         let pose_dirs = restrict(&model.pose_dirs, &coarse.vertices, model.vertex_count());
         Self {
             vertices: coarse.vertices,
             clothed,
+            hairy,
             triangles: coarse.triangles,
             skinning,
             influences,

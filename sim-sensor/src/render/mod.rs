@@ -110,6 +110,12 @@ impl Renderer {
         &self.view
     }
 
+    /// The room with nobody in it.
+    pub fn render_room(&mut self) -> &View {
+        self.restore_room();
+        &self.view
+    }
+
     /// Only what the last image drew over has to be put back.
     fn restore_room(&mut self) {
         for &pixel in &self.drawn {

@@ -1,0 +1,71 @@
+//! What can be set about tracking.
+
+use serde::{Deserialize, Serialize};
+
+use crate::{align::EnergyConfig, fit::FitConfig, initialize::InitializeConfig};
+
+/// Everything that can be set about tracking.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct TrackConfig {
+    /// Vertices of the surface that is fitted: three centimetres apart.
+    pub surface_vertices: usize,
+    /// Vertices of the surface that is searched with.
+    pub search_vertices: usize,
+    /// Depth points a frame.
+    pub points: usize,
+    pub search_points: usize,
+    /// Depth points this near to an edge of the person are left out.
+    pub rim_px: usize,
+    /// Error of a measured normal for noise as wide as a pixel.
+    pub normal_error_rad: f32,
+    /// How much of a frame's velocity is believed; the rest is as it was.
+    pub velocity_share: f32,
+    /// Rounds of matching and moving a frame.
+    pub rounds: usize,
+    /// Fewer person pixels are nobody (field practice: re-initialise below 1000).
+    pub min_person_px: usize,
+    /// Drawn body and picture differ by more than this on average: the track is bad.
+    pub bad_error_m: f32,
+    /// A search must end below this to be believed.
+    pub found_error_m: f32,
+    /// A bad track for this long is lost.
+    pub patience_secs: f32,
+    /// Pause between searches that fail.
+    pub search_every_secs: f32,
+    /// More depth points than this share without body near them: a limb is astray.
+    pub stray_share: f32,
+    /// Pause between attempts to bring a limb back.
+    pub recover_every_secs: f32,
+    /// Two headings are followed side by side for this long, until the picture has decided.
+    pub undecided_secs: f32,
+    pub energy: EnergyConfig,
+    pub search: InitializeConfig,
+    pub fit: FitConfig,
+}
+
+impl Default for TrackConfig {
+    fn default() -> Self {
+        Self {
+            surface_vertices: 2400,
+            search_vertices: 600,
+            points: 1600,
+            search_points: 260,
+            rim_px: 0,
+            normal_error_rad: 0.0,
+            velocity_share: 1.0,
+            rounds: 7,
+            min_person_px: 1000,
+            bad_error_m: 0.055,
+            found_error_m: 0.05,
+            patience_secs: 0.2,
+            search_every_secs: 0.15,
+            stray_share: 0.02,
+            recover_every_secs: 0.1,
+            undecided_secs: 0.5,
+            energy: EnergyConfig::default(),
+            search: InitializeConfig::default(),
+            fit: FitConfig::default(),
+        }
+    }
+}

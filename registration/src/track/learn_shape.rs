@@ -1,0 +1,57 @@
+//! The person's shape, learned while following.
+
+use effigy_capture::Timestamp;
+
+use super::{Tracker, phase::Following};
+use crate::{
+    align::{Context, Effort, align},
+    fit::Moment,
+    observe::Observation,
+    surface::ShapedSurface,
+};
+
+impl Tracker {
+    pub(super) fn learn_shape(
+        &mut self,
+        following: &mut Following,
+        observation: &Observation,
+        now: Timestamp,
+        good: bool,
+    ) {
+        let first_track = *self.first_track.get_or_insert(now);
+        let decided = following.bodies.len() == 1;
+        let moment = Moment {
+            secs: (now - first_track) as f32,
+            observation,
+            state: &following.bodies[0].state,
+            good: good && decided,
+        };
+        let grounded = self.world.is_grounded();
+        let config = &self.config;
+        let Some(betas) = self
+            .shape
+            .advance(&moment, &config.fit, &config.energy, grounded)
+        else {
+            return;
+        };
+        let old_pelvis = self.shaped.rest_joints[0];
+        self.shaped = ShapedSurface::new(&self.surface, betas);
+        let shift = old_pelvis - self.shaped.rest_joints[0];
+        for body in &mut following.bodies {
+            body.state.betas = betas;
+            body.state.trans += shift;
+            // The new shape settles in on the frame it was made in, so that the next one starts from rest.
+            let context =
+                Context { energy: &self.config.energy, predicted: None, grounded, whole: true };
+            let effort = Effort {
+                rounds: self.config.rounds,
+                every: 2,
+                drawn_visibility: true,
+                widen: 1.0,
+                settled_from: 0.3,
+            };
+            let settled = align(&self.shaped, &body.state, observation, &context, &effort);
+            body.state = settled.state;
+        }
+    }
+}

@@ -1,0 +1,81 @@
+//! `effigy evaluate`: how good a part of the program is, on a fixed suite, as one file of numbers.
+
+pub(crate) mod tracking;
+
+use std::fs;
+
+use anyhow::Context as _;
+use effigy_registration::smpl::builtin;
+use serde::Serialize;
+
+use self::tracking::{Suite, Table};
+use crate::{
+    cli::{EvaluateArgs, EvaluateTrackingArgs, EvaluateWhat},
+    interrupt,
+    machine::Machine,
+    pipeline::settings::Settings,
+    progress::Progress,
+};
+
+/// Changes when a key changes its meaning.
+const SCHEMA: &str = "effigy.evaluate.tracking/1";
+
+pub(crate) fn run(args: &EvaluateArgs) -> anyhow::Result<()> {
+    match &args.what {
+        EvaluateWhat::Tracking(args) => evaluate_tracking(args),
+    }
+}
+
+#[derive(Serialize)]
+struct Report<'a> {
+    schema: &'static str,
+    machine: Machine,
+    quick: bool,
+    #[serde(flatten)]
+    table: &'a Table,
+}
+
+fn evaluate_tracking(args: &EvaluateTrackingArgs) -> anyhow::Result<()> {
+    let settings = Settings::load(args.config.as_deref())?;
+    let cases = suite(args).cases();
+    let progress = Progress::new("tracking", Some(cases.len() as u64));
+    let table = tracking::evaluate(
+        &cases,
+        &builtin::body(),
+        &tracking::Options { clean: settings.clean, track: settings.track },
+        &|done| {
+            progress.advance(done as u64);
+            !interrupt::requested()
+        },
+    )?;
+    progress.finish();
+    print!("{table}");
+    let report =
+        Report { schema: SCHEMA, machine: Machine::this(), quick: args.quick, table: &table };
+    let text = serde_json::to_string_pretty(&report).context("figures are plain data")?;
+    fs::write(&args.json, text + "\n").with_context(|| {
+        format!(
+            "{}: cannot write; is the folder there?",
+            args.json.display()
+        )
+    })
+}
+
+/// The fixed suite, or what the arguments change of it.
+fn suite(args: &EvaluateTrackingArgs) -> Suite {
+    let mut suite = if args.quick {
+        Suite::quick()
+    } else {
+        Suite::full()
+    };
+    if !args.people.is_empty() {
+        suite.people.clone_from(&args.people);
+    }
+    if !args.sensor.is_empty() {
+        suite.sensors.clone_from(&args.sensor);
+    }
+    if !args.outfit.is_empty() {
+        suite.outfits.clone_from(&args.outfit);
+    }
+    suite
+}

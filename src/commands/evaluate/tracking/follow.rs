@@ -1,0 +1,128 @@
+//! One case from its first frame to its last: sensor, cleaning, tracking, and the truth beside them.
+
+use std::sync::Arc;
+
+use effigy_capture::{Frame, FrameId, Timestamp};
+use effigy_fusion::clean::Cleaner;
+use effigy_registration::{BodyModel, BodyParams, RegisteredFrame, Tracker};
+use effigy_sim_sensor::{SimulatedSensor, Truth};
+
+use super::{
+    Options,
+    cpu_time::timed,
+    loss::{Moment, Vanishing, losses_of},
+    score::{CaseScores, FrameScore, Judge, State},
+    suite::{Case, Purpose},
+};
+
+/// Follows a case's person and scores every frame.
+pub(super) fn follow(
+    case: &Case,
+    body: &Arc<BodyModel>,
+    options: &Options,
+) -> anyhow::Result<CaseScores> {
+    let mut sensor = SimulatedSensor::new(&case.scenario, Arc::clone(body))?;
+    let truth = Truth::new(&case.scenario, Arc::clone(body))?;
+    let calibration = effigy_capture::FrameSource::calibration(&sensor).clone();
+    let mut judge = Judge::new(body, calibration.depth.intrinsics);
+    let mut chain = Chain {
+        cleaner: Cleaner::new(calibration.clone(), options.clean.clone()),
+        // Where the camera stands is not told: the floor is found as on any other recording.
+        tracker: Tracker::new(
+            Arc::clone(body),
+            calibration.depth,
+            options.track.clone(),
+            None,
+        ),
+    };
+    let moments = moments(case);
+    let mut scores = CaseScores::default();
+    for (number, moment) in moments.iter().enumerate() {
+        let frame = exposure(&mut sensor, case, number as u64, moment)?;
+        let (registered, milliseconds) = chain.process(&frame)?;
+        let score = if moment.vanished.is_none() {
+            judge.score(
+                &registered,
+                &truth.at(FrameId(moment.content)),
+                milliseconds,
+            )
+        } else {
+            FrameScore::of_nobody(&registered, milliseconds)
+        };
+        scores.frames.push(score);
+    }
+    scores.losses = losses_of(&moments, &scores.frames);
+    if matches!(case.purpose, Purpose::Accuracy | Purpose::Stillness) {
+        let betas = chain.tracker.betas();
+        let error_m = height_m(body, betas) - height_m(body, truth.person().betas);
+        scores.height_error_m = Some(error_m);
+    }
+    Ok(scores)
+}
+
+/// What is timed: from a raw frame to its body.
+struct Chain {
+    cleaner: Cleaner,
+    tracker: Tracker,
+}
+
+impl Chain {
+    fn process(&mut self, frame: &Frame) -> anyhow::Result<(RegisteredFrame, f32)> {
+        let (registered, milliseconds) = timed(|| {
+            let clean = self.cleaner.process(frame)?;
+            anyhow::Ok(self.tracker.process(Arc::new(clean)))
+        });
+        Ok((registered?, milliseconds))
+    }
+}
+
+/// What happens in each frame.
+fn moments(case: &Case) -> Vec<Moment> {
+    match case.purpose {
+        Purpose::Accuracy | Purpose::Stillness => (0..case.scenario.frame_slots())
+            .map(|content| Moment { content, vanished: None })
+            .collect(),
+        Purpose::Losses(count) => super::loss::schedule(&case.scenario, count),
+    }
+}
+
+/// The frame a moment looks like, with a clock that runs on whatever the person does.
+fn exposure(
+    sensor: &mut SimulatedSensor,
+    case: &Case,
+    number: u64,
+    moment: &Moment,
+) -> anyhow::Result<Frame> {
+    let content = FrameId(moment.content);
+    let seen = match moment.vanished {
+        Some(Vanishing::Left) => sensor.expose_room(content)?,
+        _ => sensor.expose(content)?,
+    };
+    let seen = match moment.vanished {
+        Some(vanishing) => vanishing.applied(&seen, &case.scenario)?,
+        None => seen,
+    };
+    let secs = number as f64 / f64::from(case.scenario.rate_hz());
+    Ok(Frame { id: FrameId(number), timestamp: Timestamp::from_secs_f64(secs), ..seen })
+}
+
+impl FrameScore {
+    /// Anything but a track is right where nobody is.
+    fn of_nobody(registered: &RegisteredFrame, milliseconds: f32) -> Self {
+        Self {
+            timestamp: registered.clean.timestamp,
+            milliseconds,
+            present: false,
+            state: State::of(&registered.tracking),
+            observed: [false; effigy_registration::smpl::JOINT_COUNT],
+            errors: None,
+        }
+    }
+}
+
+/// From heel to crown, standing straight.
+fn height_m(body: &BodyModel, betas: [f32; 10]) -> f32 {
+    let vertices = body.shaped_vertices(&BodyParams { betas, ..BodyParams::ZERO }.betas);
+    let heights = || vertices.iter().map(|vertex| vertex.y);
+    heights().fold(f32::MIN, f32::max) - heights().fold(f32::MAX, f32::min)
+}

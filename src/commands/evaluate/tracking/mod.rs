@@ -1,0 +1,77 @@
+//! How well bodies are found and followed: simulated people of the test split, their truth, and the figures between.
+
+mod cpu_time;
+mod follow;
+mod loss;
+mod score;
+mod statistics;
+mod suite;
+mod table;
+
+pub(crate) use suite::{Case, Suite};
+pub(crate) use table::Table;
+
+use std::{
+    sync::{
+        Arc,
+        atomic::{AtomicUsize, Ordering},
+    },
+    thread,
+};
+
+use anyhow::Context as _;
+use effigy_fusion::clean::CleanConfig;
+use effigy_registration::{BodyModel, TrackConfig};
+
+use score::CaseScores;
+
+/// The settings that are evaluated.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Options {
+    pub(crate) clean: CleanConfig,
+    pub(crate) track: TrackConfig,
+}
+
+/// Follows everybody of a suite, each case on one core; `go_on` hears how many cases are done and may stop it.
+pub(crate) fn evaluate(
+    cases: &[Case],
+    body: &Arc<BodyModel>,
+    options: &Options,
+    go_on: &(dyn Fn(usize) -> bool + Sync),
+) -> anyhow::Result<Table> {
+    let next = AtomicUsize::new(0);
+    let finished = AtomicUsize::new(0);
+    let work = || -> anyhow::Result<Vec<(usize, CaseScores)>> {
+        let alone = rayon::ThreadPoolBuilder::new()
+            .num_threads(1)
+            .build()
+            .context("no thread to evaluate on")?;
+        let mut scores = Vec::new();
+        loop {
+            let index = next.fetch_add(1, Ordering::Relaxed);
+            if index >= cases.len() || !go_on(finished.load(Ordering::Relaxed)) {
+                return Ok(scores);
+            }
+            let case = &cases[index];
+            let score = alone
+                .install(|| follow::follow(case, body, options))
+                .with_context(|| case.name())?;
+            scores.push((index, score));
+            finished.fetch_add(1, Ordering::Relaxed);
+        }
+    };
+    let workers = thread::available_parallelism().map_or(1, usize::from);
+    let mut scores = thread::scope(|scope| {
+        let started: Vec<_> = (0..workers).map(|_| scope.spawn(work)).collect();
+        let mut all = Vec::new();
+        for worker in started {
+            all.extend(worker.join().expect("a worker's panic is a bug")?);
+        }
+        anyhow::Ok(all)
+    })?;
+    scores.sort_by_key(|(index, _)| *index);
+    let scored = scores
+        .into_iter()
+        .map(|(index, score)| (&cases[index], score));
+    Ok(Table::new(scored))
+}
