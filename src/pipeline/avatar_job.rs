@@ -105,8 +105,8 @@ fn died() -> anyhow::Error {
 fn lower_priority() {
     #[cfg(target_os = "linux")]
     {
-        // A quarter of a busy core: at 15 and more an avatar never came beside a window drawn in software.
-        const NICE: i32 = 5;
+        // A tenth of a busy core: at 15 and more an avatar never came beside a window drawn in software.
+        const NICE: i32 = 10;
         let thread = rustix::thread::gettid();
         if let Err(error) = rustix::process::setpriority_process(Some(thread), NICE) {
             tracing::warn!(%error, "fine-tuning keeps the priority of everything else");
@@ -125,7 +125,12 @@ struct Work {
 }
 
 impl Work {
-    fn run(self) -> anyhow::Result<FinishedAvatar> {
+    /// All of it inside a pool of low priority: what ran in the pool that everybody shares would hold up the live stages.
+    fn run(&self) -> anyhow::Result<FinishedAvatar> {
+        Threads::new(&self.settings.fine_tune.threads, lower_priority)?.run(|| self.make())
+    }
+
+    fn make(&self) -> anyhow::Result<FinishedAvatar> {
         let started = self.clock.secs();
         let newest = self
             .keyframes
@@ -155,19 +160,17 @@ impl Work {
         let tuning_started = self.clock.secs();
         let mut last = FineTuneProgress::default();
         let config = &self.settings.fine_tune;
-        let network = Threads::new(&config.threads, lower_priority)?.run(|| {
-            fine_tune(
-                prior,
-                &samples,
-                metres_per_unit,
-                config,
-                &|| self.clock.secs(),
-                &mut |now| {
-                    last = *now;
-                    self.report(now)
-                },
-            )
-        })?;
+        let network = fine_tune(
+            prior,
+            &samples,
+            metres_per_unit,
+            config,
+            &|| self.clock.secs(),
+            &mut |now| {
+                last = *now;
+                self.report(now)
+            },
+        )?;
         let fine_tune_secs = self.clock.secs() - tuning_started;
         let middle = &samples[samples.len() / 2];
         let avatar = Avatar::new(

@@ -40,7 +40,7 @@ impl Default for FineTuneConfig {
             sampling: SamplingConfig::default(),
             rates: RateConfig::default(),
             loss: LossConfig::default(),
-            threads: ThreadsConfig::default(),
+            threads: ThreadsConfig { count: 0 },
         }
     }
 }
