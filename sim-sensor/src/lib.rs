@@ -4,6 +4,7 @@
 //! [`GroundTruth`] for each of them. World space: y up, floor at y = 0, metres; the person stands at the
 //! origin and the camera looks along -z. Everything follows from the scenario's seed, bit for bit.
 
+pub mod cloth;
 pub mod error;
 pub mod noise;
 pub mod person;
@@ -21,4 +22,4 @@ pub use person::{Outfit, OutfitKind, Person};
 pub use preset::SensorPreset;
 pub use scenario::{MotionChoice, Noise, Room, Scenario};
 pub use sensor::SimulatedSensor;
-pub use truth::{GroundTruth, Truth};
+pub use truth::{ClothTruth, GroundTruth, Truth};

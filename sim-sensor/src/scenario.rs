@@ -16,6 +16,9 @@ pub struct Scenario {
     pub sensor: SensorPreset,
     pub motion: MotionChoice,
     pub outfit: OutfitKind,
+    /// Size of simulated clothes, from tight (0) to loose (1); drawn from the seed where none is given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub fit: Option<f32>,
     /// The person's shape; drawn from the seed where none is given.
     pub betas: Option<[f32; 10]>,
     pub seconds: f32,
@@ -68,6 +71,7 @@ impl Default for Scenario {
             sensor: SensorPreset::Azure,
             motion: MotionChoice::Routine(Routine::Mixture),
             outfit: OutfitKind::Demo,
+            fit: None,
             betas: None,
             seconds: 20.0,
             rate_hz: None,
@@ -132,6 +136,13 @@ impl Scenario {
             "dropped_share",
             self.dropped_share.to_string(),
             "0 to 0.9",
+        )?;
+        let fit = self.fit.is_none_or(|fit| (0.0..=1.0).contains(&fit));
+        check(
+            fit,
+            "fit",
+            format!("{:?}", self.fit),
+            "0 (tight) to 1 (loose)",
         )?;
         let betas = self
             .betas

@@ -1,6 +1,6 @@
 //! One scenario made concrete: who, doing what, seen from where.
 
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use effigy_capture::{Calibration, FrameId, Rigid3, Timestamp};
 use effigy_registration::{
@@ -9,6 +9,7 @@ use effigy_registration::{
 };
 
 use crate::{
+    cloth::{ClothConfig, ClothedSurface, Tape, Wear},
     error::SimError,
     person::{Outfit, Person, sample_betas},
     random::Randomness,
@@ -23,6 +24,8 @@ pub(crate) struct Scene {
     pub(crate) calibration: Calibration,
     pub(crate) world_from_camera: Rigid3,
     motion: Motion,
+    /// Simulated clothes, shared by all who look at this scene.
+    cloth: Option<Arc<Mutex<Tape>>>,
 }
 
 impl Scene {
@@ -32,7 +35,8 @@ impl Scene {
             .betas
             .unwrap_or_else(|| sample_betas(&body, scenario.seed));
         let outfit = Outfit::new(scenario.outfit, scenario.seed);
-        let person = Person::new(body, betas, outfit, scenario.seed);
+        let mut person = Person::new(body, betas, outfit, scenario.seed);
+        let cloth = worn(&scenario, &mut person);
         let mut calibration = scenario.sensor.calibration();
         calibration.rate_hz = scenario.rate_hz();
         calibration.color = scenario.color.then_some(calibration.depth);
@@ -46,7 +50,7 @@ impl Scene {
                 .starting_at_origin(&rest),
         };
         let world_from_camera = calibration.world_from_camera.unwrap_or_default();
-        Ok(Self { scenario, person, calibration, world_from_camera, motion })
+        Ok(Self { scenario, person, calibration, world_from_camera, motion, cloth })
     }
 
     pub(crate) fn motion_secs(&self) -> f32 {
@@ -71,9 +75,37 @@ impl Scene {
             .expect("routines and clips have at least one pose")
     }
 
+    /// The person in simulated clothes in a frame; `None` for clothes that are part of the person's surface.
+    pub(crate) fn in_cloth(&self, frame: FrameId) -> Option<ClothedSurface> {
+        let tape = self.cloth.as_ref()?;
+        // A panic elsewhere left the tape between frames at worst; it starts from a kept state again.
+        let mut tape = tape.lock().unwrap_or_else(PoisonError::into_inner);
+        let wear = tape.at(frame.0, |frame| self.pose(FrameId(frame)));
+        let mut surface = wear.surface();
+        surface.posed.colors = self.person.paint.vertex_colors();
+        Some(surface)
+    }
+
+    pub(crate) fn is_in_cloth(&self) -> bool {
+        self.cloth.is_some()
+    }
+
     pub(crate) fn is_dropped(&self, frame: FrameId) -> bool {
         // The first frame always comes: a stream that starts with a gap helps nobody.
         let random = Randomness::new(self.scenario.seed, 0, 0xd0);
         frame.0 > 0 && random.uniform(frame.0) < self.scenario.dropped_share
     }
+}
+
+/// Cuts the simulated clothes a scenario asks for; the person's paint learns their colours.
+fn worn(scenario: &Scenario, person: &mut Person) -> Option<Arc<Mutex<Tape>>> {
+    let kind = scenario.outfit.cloth()?;
+    let random = Randomness::new(scenario.seed, 0, 0xf17);
+    let fit = scenario.fit.unwrap_or_else(|| random.uniform(0));
+    let under = Arc::new(person.clone());
+    let wear = Wear::new(under, kind, fit, scenario.seed, ClothConfig::default());
+    let garments = wear.garments().iter();
+    let painted = garments.map(|g| (g.rest.points.len(), g.pattern.material));
+    person.paint = person.paint.clone().with_garments(painted);
+    Some(Arc::new(Mutex::new(Tape::new(wear, scenario.rate_hz()))))
 }

@@ -30,28 +30,22 @@ impl SimulatedSensor {
     pub fn new(scenario: &Scenario, body: Arc<BodyModel>) -> Result<Self, SimError> {
         let scene = Scene::new(scenario, body)?;
         let intrinsics = scene.calibration.depth.intrinsics;
-        let renderer = Renderer::new(intrinsics, scene.world_from_camera, scene.scenario.room);
+        let mut renderer = Renderer::new(intrinsics, scene.world_from_camera, scene.scenario.room);
+        if scene.is_in_cloth() {
+            renderer = renderer.two_sided();
+        }
         let exposure = noise::Exposure::new(&scene.calibration, scene.scenario.sensor.defects());
         Ok(Self { scene, renderer, exposure, next: 0 })
     }
 
     /// What an ideal sensor would see in one frame: true depth, normals, labels, colour.
     pub fn view(&mut self, frame: FrameId) -> &View {
-        let pose = self.scene.pose(frame);
-        let person = &self.scene.person;
-        let mesh = person.clothed_posed(&pose.theta, pose.trans);
-        self.renderer
-            .render(&mesh, &person.paint, &person.body.skinning)
+        draw(&mut self.renderer, &self.scene, frame)
     }
 
-    /// One frame by number; frames do not depend on one another.
+    /// One frame by number, in any order. With simulated clothes a frame far ahead costs the frames between.
     pub fn expose(&mut self, id: FrameId) -> Result<Frame, CaptureError> {
-        let pose = self.scene.pose(id);
-        let person = &self.scene.person;
-        let mesh = person.clothed_posed(&pose.theta, pose.trans);
-        let view = self
-            .renderer
-            .render(&mesh, &person.paint, &person.body.skinning);
+        let view = draw(&mut self.renderer, &self.scene, id);
         Self::delivered(&self.scene, &mut self.exposure, view, id)
     }
 
@@ -93,6 +87,16 @@ impl SimulatedSensor {
     pub fn scenario(&self) -> &Scenario {
         &self.scene.scenario
     }
+}
+
+fn draw<'a>(renderer: &'a mut Renderer, scene: &Scene, frame: FrameId) -> &'a View {
+    let person = &scene.person;
+    if let Some(surface) = scene.in_cloth(frame) {
+        return renderer.render(&surface.posed, &person.paint, &surface.weights);
+    }
+    let pose = scene.pose(frame);
+    let mesh = person.clothed_posed(&pose.theta, pose.trans);
+    renderer.render(&mesh, &person.paint, &person.body.skinning)
 }
 
 impl FrameSource for SimulatedSensor {

@@ -4,10 +4,15 @@ use std::sync::Arc;
 
 use effigy_capture::{FrameId, Rigid3, Timestamp};
 use effigy_fusion::mesh::TriangleMesh;
-use effigy_registration::{BodyModel, BodyParams, PosedBody, smpl::JOINT_COUNT};
+use effigy_registration::{
+    BodyModel, BodyParams, PosedBody,
+    smpl::{JOINT_COUNT, VertexWeights},
+};
 use glam::Vec3;
 
-use crate::{error::SimError, person::Person, scenario::Scenario, scene::Scene};
+use crate::{
+    cloth::ClothedSurface, error::SimError, person::Person, scenario::Scenario, scene::Scene,
+};
 
 /// The truth about each frame of a scenario.
 #[derive(Clone, Debug)]
@@ -15,7 +20,9 @@ pub struct Truth {
     scene: Scene,
 }
 
-/// The truth about one frame. Vertices correspond: index `i` is one point of the body in all surfaces.
+/// The truth about one frame. Vertex `i` of the clothed surfaces is one point in all frames of a scenario. Without
+/// simulated clothes it is also vertex `i` of the body; with them the body's vertices come first, the garments'
+/// follow, and triangles are only those that can be seen from outside.
 #[derive(Clone, Debug)]
 pub struct GroundTruth {
     pub id: FrameId,
@@ -27,9 +34,22 @@ pub struct GroundTruth {
     pub minimal: PosedBody,
     /// The outer surface, with normals and colours.
     pub clothed_in_world: TriangleMesh,
-    /// The outer surface of this pose in star pose; skinning weights are the body's.
+    /// The outer surface of this pose in star pose, vertex by vertex.
     pub clothed_canonical: Vec<Vec3>,
+    /// The surface in star pose once more, with triangles and normals of its own, where clothes are simulated.
+    pub in_cloth: Option<ClothTruth>,
     pub rest_joints: [Vec3; JOINT_COUNT],
+}
+
+/// What simulated clothes add to the truth.
+#[derive(Clone, Debug)]
+pub struct ClothTruth {
+    /// The visible surface in star pose, with the normals of that surface.
+    pub canonical: TriangleMesh,
+    /// Skinning weights of each vertex; those of garments are diffused over the garment.
+    pub weights: Vec<VertexWeights>,
+    /// 0 for the person, 1 for the innermost garment, and so on.
+    pub layers: Vec<u8>,
 }
 
 impl Truth {
@@ -47,17 +67,35 @@ impl Truth {
         self.scene.person.params(&pose.theta, pose.trans)
     }
 
+    /// Frames in any order; with simulated clothes a frame far ahead costs the frames between.
     pub fn at(&self, frame: FrameId) -> GroundTruth {
         let person = &self.scene.person;
         let params = self.params(frame);
+        let (clothed_in_world, clothed_canonical, in_cloth) = match self.scene.in_cloth(frame) {
+            Some(surface) => {
+                let ClothedSurface { posed, canonical, weights, layers } = surface.envelope();
+                let vertices = canonical.vertices.clone();
+                (
+                    posed,
+                    vertices,
+                    Some(ClothTruth { canonical, weights, layers }),
+                )
+            }
+            None => (
+                person.clothed_posed(&params.theta, params.trans),
+                person.clothed_canonical(&params.theta),
+                None,
+            ),
+        };
         GroundTruth {
             id: frame,
             timestamp: self.scene.timestamp(frame),
             params,
             world_from_camera: self.scene.world_from_camera,
             minimal: person.body.pose(&params),
-            clothed_in_world: person.clothed_posed(&params.theta, params.trans),
-            clothed_canonical: person.clothed_canonical(&params.theta),
+            clothed_in_world,
+            clothed_canonical,
+            in_cloth,
             rest_joints: person.rest_joints,
         }
     }

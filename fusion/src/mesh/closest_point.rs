@@ -101,6 +101,14 @@ impl ClosestPoint {
         Ok(())
     }
 
+    /// As [`Self::refit`], for a mesh that moves many times between questions about inside and outside: signs
+    /// and pseudo-normals stay those of the last [`Self::refit`], distances and nearest points are exact.
+    pub fn refit_distances(&mut self, vertices: &[Vec3]) -> Result<(), FusionError> {
+        check(vertices, &self.triangles)?;
+        self.place_boxes(vertices);
+        Ok(())
+    }
+
     /// The nearest point of the mesh. A query that is not finite gets a distance of NaN.
     pub fn query(&self, point: Vec3) -> Hit {
         let nowhere =
@@ -238,6 +246,11 @@ impl ClosestPoint {
 
     /// Sets boxes, triangles and normals from the vertices.
     fn place(&mut self, vertices: &[Vec3]) {
+        self.place_boxes(vertices);
+        self.normals.update(vertices, &self.triangles);
+    }
+
+    fn place_boxes(&mut self, vertices: &[Vec3]) {
         for leaf in &mut self.leaves {
             let [a, b, c] =
                 self.triangles[leaf.triangle as usize].map(|vertex| vertices[vertex as usize]);
@@ -261,7 +274,6 @@ impl ClosestPoint {
             self.nodes[index].min = min;
             self.nodes[index].max = max;
         }
-        self.normals.update(vertices, &self.triangles);
     }
 }
 
@@ -499,9 +511,12 @@ mod tests {
             .map(|v| vec3(v.x + 0.5 * v.y * v.y, 0.4 * v.y, v.z))
             .collect();
         tree.refit(&bent).unwrap();
+        let mut quick = ClosestPoint::from_mesh(&mesh).unwrap();
+        quick.refit_distances(&bent).unwrap();
         let anew = ClosestPoint::new(&bent, &mesh.triangles).unwrap();
         for point in points_around(500, 4) {
             assert_eq!(tree.query(point).distance, anew.query(point).distance);
+            assert_eq!(quick.query(point), tree.query(point));
             assert!((tree.signed_distance(point) - anew.signed_distance(point)).abs() < 1e-6);
         }
     }

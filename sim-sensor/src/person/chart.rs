@@ -7,40 +7,40 @@ use glam::Vec3;
 
 /// One vertex of the zero-pose body, in tailor's terms.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Place {
+pub(crate) struct Place {
     /// 0 for the body's left, 1 for its right.
-    pub(super) side: usize,
+    pub(crate) side: usize,
     /// Along the arm: 0 shoulder, 1 elbow, 2 wrist; negative on the trunk.
-    pub(super) arm: f32,
+    pub(crate) arm: f32,
     /// Down the leg: 0 hip, 1 knee, 2 ankle; negative above the hips.
-    pub(super) leg: f32,
+    pub(crate) leg: f32,
     /// Up the trunk: 0 pelvis, 1 neck.
-    pub(super) trunk: f32,
+    pub(crate) trunk: f32,
     /// Shares of skinning.
-    pub(super) head_share: f32,
-    pub(super) arm_share: f32,
-    pub(super) leg_share: f32,
-    pub(super) foot_share: f32,
+    pub(crate) head_share: f32,
+    pub(crate) arm_share: f32,
+    pub(crate) leg_share: f32,
+    pub(crate) foot_share: f32,
 }
 
 /// A body in the zero pose, charted.
 #[derive(Clone, Debug)]
-pub(super) struct Chart {
-    pub(super) vertices: Vec<Vec3>,
-    pub(super) normals: Vec<Vec3>,
+pub(crate) struct Chart {
+    pub(crate) vertices: Vec<Vec3>,
+    pub(crate) normals: Vec<Vec3>,
     /// Normals of a smoothed surface: what loose cloth sees of the body.
-    pub(super) smooth_normals: Vec<Vec3>,
+    pub(crate) smooth_normals: Vec<Vec3>,
     /// How far the smoothed surface lies outside: hollows that cloth spans. At least 0, metres.
-    pub(super) hollow_m: Vec<f32>,
-    pub(super) joints: [Vec3; JOINT_COUNT],
-    pub(super) places: Vec<Place>,
+    pub(crate) hollow_m: Vec<f32>,
+    pub(crate) joints: [Vec3; JOINT_COUNT],
+    pub(crate) places: Vec<Place>,
     /// The lowest point of each foot, and the top of the head.
-    pub(super) sole_y: [f32; 2],
-    pub(super) head_top_y: f32,
+    pub(crate) sole_y: [f32; 2],
+    pub(crate) head_top_y: f32,
 }
 
 impl Chart {
-    pub(super) fn new(body: &BodyModel, vertices: Vec<Vec3>, joints: &[Vec3; JOINT_COUNT]) -> Self {
+    pub(crate) fn new(body: &BodyModel, vertices: Vec<Vec3>, joints: &[Vec3; JOINT_COUNT]) -> Self {
         let normals = vertex_normals(&vertices, &body.triangles);
         let neighbours = Neighbours::of(vertices.len(), &body.triangles);
         let smoothed = neighbours.smoothed(&vertices, 14);

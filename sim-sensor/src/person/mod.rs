@@ -14,7 +14,7 @@ use effigy_registration::{
 };
 use glam::{Mat3, Vec3};
 
-mod chart;
+pub(crate) mod chart;
 mod folds;
 mod identity;
 mod outfit;
@@ -95,9 +95,18 @@ impl Person {
 
     /// The outer surface in the space of `trans`, with normals and colours.
     pub fn clothed_posed(&self, theta: &[Vec3; JOINT_COUNT], trans: Vec3) -> TriangleMesh {
+        self.mesh(self.clothed_posed_vertices(theta, trans))
+    }
+
+    /// As [`Self::clothed_posed`], vertices only.
+    pub fn clothed_posed_vertices(&self, theta: &[Vec3; JOINT_COUNT], trans: Vec3) -> Vec<Vec3> {
         let (bones, _) = BoneTransforms::from_pose(theta, &self.rest_joints);
-        let vertices = self.skinned(self.clothed_zero_pose(theta), &bones, trans);
-        self.mesh(vertices)
+        self.skinned(self.clothed_zero_pose(theta), &bones, trans)
+    }
+
+    /// Where each vertex lies, in a tailor's words.
+    pub(crate) fn chart(&self) -> Chart {
+        Chart::new(&self.body, self.minimal.clone(), &self.rest_joints)
     }
 
     /// A surface on the body's topology, with normals from its own geometry and this person's colours.

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::random::Randomness;
+use crate::{cloth::ClothKind, random::Randomness};
 
 /// The outfits a scenario can ask for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -21,6 +21,23 @@ pub enum OutfitKind {
     Demo,
     /// One of the above (never `bare`) with sizes and colours of its own, from the seed.
     Random,
+    /// Simulated cloth, over shoes: see [`crate::cloth`].
+    #[serde(rename = "tshirt-trousers")]
+    TshirtTrousers,
+    #[serde(rename = "tshirt-shorts")]
+    TshirtShorts,
+    #[serde(rename = "longsleeve-trousers")]
+    LongsleeveTrousers,
+    #[serde(rename = "longsleeve-wide-trousers")]
+    LongsleeveWideTrousers,
+    #[serde(rename = "polo-trousers")]
+    PoloTrousers,
+    #[serde(rename = "hoodie-trousers")]
+    HoodieTrousers,
+    #[serde(rename = "blazer-trousers")]
+    BlazerTrousers,
+    Skirt,
+    Dress,
 }
 
 /// Everything on top of the skin.
@@ -63,8 +80,63 @@ pub(super) const MIN_CLOTH_M: f32 = 0.002;
 
 const SHOES: Shoes = Shoes { upper_m: 0.006, sole_m: 0.016 };
 
+impl OutfitKind {
+    /// As scenarios spell it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Bare => "bare",
+            Self::CloseFitting => "close_fitting",
+            Self::Loose => "loose",
+            Self::Sport => "sport",
+            Self::Demo => "demo",
+            Self::Random => "random",
+            _ => self.cloth().map_or("cloth", ClothKind::name),
+        }
+    }
+
+    /// The simulated clothes of this name, if it is one of those.
+    pub fn cloth(self) -> Option<ClothKind> {
+        match self {
+            Self::TshirtTrousers => Some(ClothKind::TshirtTrousers),
+            Self::TshirtShorts => Some(ClothKind::TshirtShorts),
+            Self::LongsleeveTrousers => Some(ClothKind::LongsleeveTrousers),
+            Self::LongsleeveWideTrousers => Some(ClothKind::LongsleeveWideTrousers),
+            Self::PoloTrousers => Some(ClothKind::PoloTrousers),
+            Self::HoodieTrousers => Some(ClothKind::HoodieTrousers),
+            Self::BlazerTrousers => Some(ClothKind::BlazerTrousers),
+            Self::Skirt => Some(ClothKind::Skirt),
+            Self::Dress => Some(ClothKind::Dress),
+            Self::Bare
+            | Self::CloseFitting
+            | Self::Loose
+            | Self::Sport
+            | Self::Demo
+            | Self::Random => None,
+        }
+    }
+}
+
+impl From<ClothKind> for OutfitKind {
+    fn from(kind: ClothKind) -> Self {
+        match kind {
+            ClothKind::TshirtTrousers => Self::TshirtTrousers,
+            ClothKind::TshirtShorts => Self::TshirtShorts,
+            ClothKind::LongsleeveTrousers => Self::LongsleeveTrousers,
+            ClothKind::LongsleeveWideTrousers => Self::LongsleeveWideTrousers,
+            ClothKind::PoloTrousers => Self::PoloTrousers,
+            ClothKind::HoodieTrousers => Self::HoodieTrousers,
+            ClothKind::BlazerTrousers => Self::BlazerTrousers,
+            ClothKind::Skirt => Self::Skirt,
+            ClothKind::Dress => Self::Dress,
+        }
+    }
+}
+
 impl Outfit {
     pub const BARE: Self = Self { shirt: None, trousers: None, shoes: None, hair_m: 0.0 };
+
+    /// Shoes and hair: what simulated clothes are worn over.
+    pub const UNDER: Self = Self { shirt: None, trousers: None, shoes: Some(SHOES), hair_m: 0.014 };
 
     /// The outfit of a kind; `seed` matters for random ones only.
     pub fn new(kind: OutfitKind, seed: u64) -> Self {
@@ -75,6 +147,8 @@ impl Outfit {
             OutfitKind::Sport => Self::sport(),
             OutfitKind::Demo => Self::demo(),
             OutfitKind::Random => Self::random(seed),
+            // What is worn over these is simulated.
+            _ => Self::UNDER,
         }
     }
 

@@ -13,6 +13,8 @@ pub struct Paint {
     covers: Vec<Vec4>,
     skin: Material,
     layers: [Material; 4],
+    /// Garments of their own: the vertices that follow the body's, one material each.
+    garments: Vec<(usize, Material)>,
 }
 
 /// An sRGB colour, and the share of infrared light returned, which is often far from the brightness.
@@ -65,11 +67,27 @@ impl Paint {
                 SHOES,
                 pick(&HAIR, random, 3),
             ],
+            garments: Vec::new(),
         }
+    }
+
+    /// For a mesh in which these garments, each with so many vertices, follow the body.
+    pub fn with_garments(mut self, garments: impl Iterator<Item = (usize, Material)>) -> Self {
+        let mut end = self.covers.len();
+        self.garments = garments
+            .map(|(count, material)| {
+                end += count;
+                (end, material)
+            })
+            .collect();
+        self
     }
 
     /// The material at a point of a triangle.
     pub fn at(&self, corners: [usize; 3], weights: Vec3) -> Material {
+        if corners[0] >= self.covers.len() {
+            return self.garment_at(corners[0]);
+        }
         let cover: Vec4 = (0..3).map(|k| self.covers[corners[k]] * weights[k]).sum();
         self.outermost(cover)
     }
@@ -78,7 +96,16 @@ impl Paint {
         self.covers
             .iter()
             .map(|&cover| self.outermost(cover).color)
+            .chain(
+                (self.covers.len()..self.garments.last().map_or(0, |g| g.0))
+                    .map(|v| self.garment_at(v).color),
+            )
             .collect()
+    }
+
+    fn garment_at(&self, vertex: usize) -> Material {
+        let found = self.garments.iter().find(|(end, _)| vertex < *end);
+        found.map_or(self.skin, |&(_, material)| material)
     }
 
     fn outermost(&self, cover: Vec4) -> Material {

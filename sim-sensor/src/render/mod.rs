@@ -38,6 +38,7 @@ pub struct View {
 /// Draws the person in front of a room that is drawn only once.
 pub struct Renderer {
     rasterizer: Rasterizer,
+    faces: Faces,
     camera_from_world: Rigid3,
     empty_room: View,
     view: View,
@@ -51,6 +52,7 @@ impl Renderer {
         let empty_room = room::draw(camera, world_from_camera, room);
         Self {
             rasterizer: Rasterizer::with_faces(camera, Faces::Front),
+            faces: Faces::Front,
             camera_from_world: world_from_camera.inverse(),
             view: empty_room.clone(),
             empty_room,
@@ -60,7 +62,14 @@ impl Renderer {
         }
     }
 
-    /// Draws one mesh on the body's topology, with its normals, in world space.
+    /// For people in simulated clothes: cloth is seen from both sides.
+    pub fn two_sided(mut self) -> Self {
+        self.faces = Faces::Both;
+        self.rasterizer = Rasterizer::with_faces(self.view.camera, self.faces);
+        self
+    }
+
+    /// Draws one mesh with its normals, in world space; one set of skinning weights a vertex.
     pub fn render(
         &mut self,
         person_in_world: &TriangleMesh,
@@ -100,6 +109,9 @@ impl Renderer {
                 .sum();
             view.depth_m[pixel] = depth_m;
             view.normals[pixel] = normal.normalize_or(Vec3::NEG_Z);
+            if self.faces == Faces::Both && view.normals[pixel].dot(view.ray(pixel)) > 0.0 {
+                view.normals[pixel] = -view.normals[pixel];
+            }
             view.measure_incidence(pixel);
             view.labels[pixel] = Label::of_weights(&skinning[nearest]);
             let material = paint.at(corners, weights);

@@ -64,14 +64,7 @@ impl Case {
 }
 
 pub(crate) fn outfit_name(outfit: OutfitKind) -> &'static str {
-    match outfit {
-        OutfitKind::Bare => "bare",
-        OutfitKind::CloseFitting => "close_fitting",
-        OutfitKind::Loose => "loose",
-        OutfitKind::Sport => "sport",
-        OutfitKind::Demo => "demo",
-        OutfitKind::Random => "random",
-    }
+    outfit.name()
 }
 
 impl Suite {

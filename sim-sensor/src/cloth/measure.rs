@@ -1,0 +1,49 @@
+//! What simulated clothes are judged by: depth inside the body, strain, and how much they change.
+
+use effigy_fusion::mesh::closest_point::ClosestPoint;
+use glam::Vec3;
+
+use super::wear::Wear;
+
+impl Wear {
+    /// How far outside the minimal body each point of every garment is, in metres; negative inside.
+    pub fn clearances_m(&self) -> Vec<f32> {
+        let person = self.person();
+        let posed = person
+            .body
+            .pose(&person.params(&self.pose().theta, self.pose().trans));
+        let tree = ClosestPoint::new(&posed.vertices, &person.body.triangles)
+            .expect("a posed body is finite");
+        self.points()
+            .flatten()
+            .map(|&point| tree.signed_distance(point))
+            .collect()
+    }
+
+    /// Every point of every garment in star pose.
+    pub fn garments_in_star_pose(&self) -> Vec<Vec3> {
+        let garments = self.garments().iter().zip(self.points());
+        garments
+            .flat_map(|(garment, points)| self.in_star_pose(points, &garment.weights))
+            .collect()
+    }
+}
+
+/// How far each point strays from its mean over frames, root mean square.
+pub fn strays_m(frames: &[Vec<Vec3>]) -> Vec<f32> {
+    let count = frames.len().max(1) as f32;
+    let points = frames.first().map_or(0, Vec::len);
+    (0..points)
+        .map(|v| {
+            let mean = frames.iter().map(|frame| frame[v]).sum::<Vec3>() / count;
+            let squares = frames.iter().map(|frame| frame[v].distance_squared(mean));
+            (squares.sum::<f32>() / count).sqrt()
+        })
+        .collect()
+}
+
+/// Root mean square of the distances between two states of the same points.
+pub fn rms_between_m(a: &[Vec3], b: &[Vec3]) -> f32 {
+    let squares: f32 = a.iter().zip(b).map(|(a, b)| a.distance_squared(*b)).sum();
+    (squares / a.len().max(1) as f32).sqrt()
+}

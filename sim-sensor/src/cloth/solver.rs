@@ -1,0 +1,310 @@
+//! Cloth as points joined by constraints, moved by extended position-based dynamics
+//! (Macklin, Müller and Chentanez, *XPBD*, MIG 2016; *Small steps in physics simulation*, SCA 2019).
+
+use glam::Vec3;
+
+use super::{
+    collider::Collider,
+    sew::{Garment, Held},
+    sheet::NONE,
+};
+
+const GRAVITY: Vec3 = Vec3::new(0.0, -9.81, 0.0);
+/// Nothing in a wardrobe is faster.
+const MAX_SPEED_M_S: f32 = 12.0;
+/// How far around a point surfaces are looked for: deeper than cloth ever gets between two looks.
+const REACH_M: f32 = 0.035;
+/// Contacts are kept ready this far beyond touching.
+const MARGIN_M: f32 = 0.004;
+/// Edges bent more than this in the rest shape are folds that stay.
+const CREASE_COSINE: f32 = 0.8;
+/// Folds that stay are this much stiffer.
+const CREASE_STIFFNESS: f32 = 30.0;
+
+/// One garment's moving state.
+#[derive(Clone, Debug)]
+pub(super) struct Cloth {
+    pub(super) points: Vec<Vec3>,
+    pub(super) velocities: Vec<Vec3>,
+    before: Vec<Vec3>,
+    stretches: Vec<Stretch>,
+    bends: Vec<Bend>,
+    pub(super) held: Vec<Held>,
+    /// Where what is held should be at the end of the step.
+    pub(super) anchors: Vec<Vec3>,
+    contacts: Vec<Contact>,
+    /// For each collider, where each point's last search ended.
+    hints: Vec<Vec<u32>>,
+    friction: f32,
+    drag: f32,
+}
+
+/// Keeps an edge's length.
+#[derive(Clone, Copy, Debug)]
+struct Stretch {
+    ends: [u32; 2],
+    rest_m: f32,
+    compliance: f32,
+    lambda: f32,
+}
+
+/// Keeps two triangles flat, or folded as they were cut: `|sum shares * points| = rest_m`
+/// (the discrete bending of Bergou et al., *A quadratic bending model*, SGP 2006).
+#[derive(Clone, Copy, Debug)]
+struct Bend {
+    points: [u32; 4],
+    shares: [f32; 4],
+    rest_m: f32,
+    compliance: f32,
+    lambda: f32,
+}
+
+/// A point that must stay on its side of a plane.
+#[derive(Clone, Copy, Debug)]
+struct Contact {
+    point: u32,
+    normal: Vec3,
+    offset_m: f32,
+    moved: Vec3,
+    pushed_m: f32,
+}
+
+/// What a garment touches: how near it may come to each surface.
+pub(super) struct Obstacle<'a> {
+    pub(super) collider: &'a Collider,
+    pub(super) thickness_m: f32,
+}
+
+impl Cloth {
+    pub(super) fn new(garment: &Garment) -> Self {
+        let points = garment.rest.points.clone();
+        let fabric = &garment.pattern.fabric;
+        let at = |v: u32| points[v as usize];
+        let edges = garment.rest.edges();
+        let stretches = edges
+            .iter()
+            .map(|edge| Stretch {
+                ends: edge.ends,
+                rest_m: at(edge.ends[0]).distance(at(edge.ends[1])),
+                compliance: fabric.stretch_compliance,
+                lambda: 0.0,
+            })
+            .collect();
+        let bends = edges
+            .iter()
+            .filter(|edge| !edge.is_border())
+            .map(|edge| {
+                let [a, b] = edge.ends;
+                let [c, d] = edge.opposite;
+                Bend::new([a, b, c, d], [a, b, c, d].map(at), fabric.bend_compliance)
+            })
+            .collect();
+        Self {
+            velocities: vec![Vec3::ZERO; points.len()],
+            before: points.clone(),
+            points,
+            stretches,
+            bends,
+            anchors: vec![Vec3::ZERO; garment.held.len()],
+            held: garment.held.clone(),
+            contacts: Vec::new(),
+            hints: Vec::new(),
+            friction: fabric.friction,
+            drag: fabric.drag,
+        }
+    }
+
+    /// Forgets where searches ended, so that a state needs positions and velocities only.
+    pub(super) fn forget_hints(&mut self, colliders: usize) {
+        self.hints.resize(colliders, Vec::new());
+        for hints in &mut self.hints {
+            hints.clear();
+            hints.resize(self.points.len(), NONE);
+        }
+    }
+
+    /// Moves by one small step; the first obstacle is the body.
+    pub(super) fn step(&mut self, secs: f32, iterations: usize, obstacles: &[Obstacle<'_>]) {
+        let kept = (1.0 - self.drag * secs).max(0.0);
+        for v in 0..self.points.len() {
+            let velocity = self.velocities[v] * kept + GRAVITY * secs;
+            self.before[v] = self.points[v];
+            self.points[v] += velocity.clamp_length_max(MAX_SPEED_M_S) * secs;
+        }
+        self.find_contacts(obstacles);
+        for stretch in &mut self.stretches {
+            stretch.lambda = 0.0;
+        }
+        for bend in &mut self.bends {
+            bend.lambda = 0.0;
+        }
+        let per_square = (secs * secs).recip();
+        for iteration in 0..iterations {
+            for bend in &mut self.bends {
+                bend.solve(&mut self.points, per_square);
+            }
+            // Both ways in turn: a pull then runs through the whole garment from either end.
+            if iteration % 2 == 0 {
+                for stretch in &mut self.stretches {
+                    stretch.solve(&mut self.points, per_square);
+                }
+            } else {
+                for stretch in self.stretches.iter_mut().rev() {
+                    stretch.solve(&mut self.points, per_square);
+                }
+            }
+            self.hold(per_square);
+            for contact in &mut self.contacts {
+                contact.push(&mut self.points);
+            }
+        }
+        self.rub();
+        for v in 0..self.points.len() {
+            self.velocities[v] = (self.points[v] - self.before[v]) / secs;
+        }
+    }
+
+    /// Where every point is outside of everything, without a push that would move it on.
+    pub(super) fn push_out(&mut self, obstacles: &[Obstacle<'_>]) {
+        for _ in 0..2 {
+            self.find_contacts(obstacles);
+            for contact in &mut self.contacts {
+                contact.push(&mut self.points);
+            }
+        }
+    }
+
+    fn find_contacts(&mut self, obstacles: &[Obstacle<'_>]) {
+        self.contacts.clear();
+        for (obstacle, hints) in obstacles.iter().zip(&mut self.hints) {
+            for (v, &point) in self.points.iter().enumerate() {
+                let Some(touch) = obstacle.collider.nearest(point, REACH_M, hints[v]) else {
+                    continue;
+                };
+                hints[v] = touch.hint;
+                if touch.distance_m > obstacle.thickness_m + MARGIN_M {
+                    continue;
+                }
+                self.contacts.push(Contact {
+                    point: v as u32,
+                    normal: touch.normal,
+                    offset_m: touch.normal.dot(touch.point) + obstacle.thickness_m,
+                    moved: touch.moved,
+                    pushed_m: 0.0,
+                });
+            }
+        }
+    }
+
+    /// Draws what is held towards where the trunk carries it.
+    fn hold(&mut self, per_square: f32) {
+        for (held, &at) in self.held.iter().zip(&self.anchors) {
+            let point = &mut self.points[held.point as usize];
+            *point += (at - *point) / (1.0 + held.compliance * per_square);
+        }
+    }
+
+    /// Friction: what slides along a surface is held back in proportion to how hard it was pushed.
+    fn rub(&mut self) {
+        for contact in &self.contacts {
+            if contact.pushed_m <= 0.0 {
+                continue;
+            }
+            let v = contact.point as usize;
+            let slip = self.points[v] - self.before[v] - contact.moved;
+            let along = slip - contact.normal * contact.normal.dot(slip);
+            let most_m = self.friction * contact.pushed_m;
+            let share = (most_m / along.length().max(1e-9)).min(1.0);
+            self.points[v] -= along * share;
+        }
+    }
+
+    /// The relative change of each edge's length.
+    pub(super) fn strains(&self) -> impl Iterator<Item = f32> + '_ {
+        self.stretches.iter().map(|stretch| {
+            let [a, b] = stretch.ends.map(|v| self.points[v as usize]);
+            a.distance(b) / stretch.rest_m - 1.0
+        })
+    }
+}
+
+impl Stretch {
+    #[inline]
+    fn solve(&mut self, points: &mut [Vec3], per_square: f32) {
+        let [a, b] = self.ends.map(|v| v as usize);
+        let apart = points[a] - points[b];
+        let length_m = apart.length();
+        if length_m < 1e-7 {
+            return;
+        }
+        let compliance = self.compliance * per_square;
+        let error_m = length_m - self.rest_m;
+        let delta = -(error_m + compliance * self.lambda) / (2.0 + compliance);
+        self.lambda += delta;
+        let push = apart * (delta / length_m);
+        points[a] += push;
+        points[b] -= push;
+    }
+}
+
+impl Bend {
+    fn new(points: [u32; 4], [a, b, c, d]: [Vec3; 4], compliance: f32) -> Self {
+        let cotangent = |at: Vec3, left: Vec3, right: Vec3| {
+            let (u, v) = (left - at, right - at);
+            (u.dot(v) / u.cross(v).length().max(1e-9)).clamp(0.1, 3.0)
+        };
+        // At a towards c and d, at b towards c and d.
+        let (ac, ad) = (cotangent(a, b, c), cotangent(a, b, d));
+        let (bc, bd) = (cotangent(b, a, c), cotangent(b, a, d));
+        let shares = [bc + bd, ac + ad, -(ac + bc), -(ad + bd)];
+        let size = shares.map(|s| s * s).iter().sum::<f32>().sqrt() * 0.5;
+        let shares = shares.map(|s| s / size);
+        let rest: Vec3 = a * shares[0] + b * shares[1] + c * shares[2] + d * shares[3];
+        let first = (b - a).cross(c - a).normalize_or_zero();
+        let second = (d - a).cross(b - a).normalize_or_zero();
+        let creased = first.dot(second) < CREASE_COSINE;
+        Self {
+            points,
+            shares,
+            rest_m: if creased { rest.length() } else { 0.0 },
+            compliance: if creased {
+                compliance / CREASE_STIFFNESS
+            } else {
+                compliance
+            },
+            lambda: 0.0,
+        }
+    }
+
+    #[inline]
+    fn solve(&mut self, points: &mut [Vec3], per_square: f32) {
+        let at = self.points.map(|v| v as usize);
+        let sum = points[at[0]] * self.shares[0]
+            + points[at[1]] * self.shares[1]
+            + points[at[2]] * self.shares[2]
+            + points[at[3]] * self.shares[3];
+        let length_m = sum.length();
+        if length_m < 1e-7 {
+            return;
+        }
+        let compliance = self.compliance * per_square;
+        // The shares are scaled so that their squares sum to four.
+        let delta = -(length_m - self.rest_m + compliance * self.lambda) / (4.0 + compliance);
+        self.lambda += delta;
+        let push = sum * (delta / length_m);
+        for (v, share) in at.into_iter().zip(self.shares) {
+            points[v] += push * share;
+        }
+    }
+}
+
+impl Contact {
+    #[inline]
+    fn push(&mut self, points: &mut [Vec3]) {
+        let point = &mut points[self.point as usize];
+        // What an earlier round pushed too far may come back, but nothing is ever pulled in.
+        let push_m = (self.offset_m - self.normal.dot(*point)).max(-self.pushed_m);
+        *point += self.normal * push_m;
+        self.pushed_m += push_m;
+    }
+}
