@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use effigy_registration::motion::Routine;
-use effigy_sim_sensor::{MotionChoice, OutfitKind, SensorPreset};
+use effigy_sim_sensor::{MotionChoice, OutfitKind, SensorPreset, dataset::DatasetPreset};
 use serde::de::{DeserializeOwned, IntoDeserializer as _, value};
 
 /// One depth camera in, a live avatar out.
@@ -45,6 +45,9 @@ pub(crate) enum Command {
     /// Play a motion on an avatar and write it for Blender, three.js and others
     #[command(after_help = "Example: effigy export avatar.effigy --motion walk.bvh --glb out.glb")]
     Export(ExportArgs),
+    /// Simulate people in clothes, to learn from and to measure with
+    #[command(after_help = "Example: effigy dataset make --preset small --out data/small")]
+    Dataset(DatasetArgs),
     /// Make the prior that ships with the program
     #[command(
         after_help = "Example: effigy train prior --out avatar/assets/prior_live.safetensors"
@@ -201,6 +204,52 @@ pub(crate) struct ExportArgs {
     /// The body model the avatar was made with, if it was not the built-in one
     #[arg(long, value_name = "FILE")]
     pub(crate) body: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct DatasetArgs {
+    #[command(subcommand)]
+    pub(crate) what: DatasetWhat,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum DatasetWhat {
+    /// Make a data set; a second run goes on where the first was interrupted
+    #[command(after_help = "Example: effigy dataset make --preset prior --seed 1 --out data/prior")]
+    Make(DatasetMakeArgs),
+    /// Draw a contact sheet of a data set
+    #[command(after_help = "Example: effigy dataset view data/prior --out prior.png")]
+    View(DatasetViewArgs),
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct DatasetMakeArgs {
+    /// What for: prior (to train on), cape-like (the paper's tables), small (tests)
+    #[arg(long, value_parser = kebab::<DatasetPreset>)]
+    pub(crate) preset: DatasetPreset,
+    /// Who the people are
+    #[arg(long, default_value_t = 1)]
+    pub(crate) seed: u64,
+    /// The folder to fill
+    #[arg(long)]
+    pub(crate) out: PathBuf,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct DatasetViewArgs {
+    /// The folder that `dataset make` filled
+    pub(crate) dataset: PathBuf,
+    /// The picture to write
+    #[arg(long)]
+    pub(crate) out: PathBuf,
+    /// Sequences shown of each outfit
+    #[arg(long, default_value_t = 1)]
+    pub(crate) rows: usize,
+}
+
+/// A name as the data set's files spell it.
+fn kebab<T: DeserializeOwned>(text: &str) -> Result<T, value::Error> {
+    T::deserialize(text.into_deserializer())
 }
 
 #[derive(Debug, Args)]

@@ -4,7 +4,7 @@ use effigy_fusion::{
     FusionError, TriangleMesh,
     mesh::{closest_point::ClosestPoint, normals::vertex_normals, sample::sample_surface},
 };
-use effigy_registration::{BodyModel, smpl::JOINT_COUNT};
+use effigy_registration::smpl::{JOINT_COUNT, VertexWeights};
 use glam::Vec3;
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use serde::{Deserialize, Serialize};
@@ -23,18 +23,22 @@ pub struct SurfaceMetrics {
 /// Bones whose vertices count: the body without ankles, feet, neck, head, wrists and hands.
 const MEASURED_BONES: [u8; 14] = [0, 1, 2, 3, 4, 5, 6, 9, 13, 14, 16, 17, 18, 19];
 
-/// Which vertices of a mesh on the body's topology count: those whose largest weight is a measured bone's.
-pub fn measured_vertices(model: &BodyModel) -> Vec<bool> {
-    model
-        .skinning
-        .iter()
-        .map(|weights| {
-            let largest = (0..4)
-                .rev()
-                .max_by(|&a, &b| weights.weights[a].total_cmp(&weights.weights[b]))
-                .expect("there are four slots");
-            MEASURED_BONES.contains(&weights.bones[largest])
-        })
+/// Which vertices of a surface count: those that its triangles use and whose largest weight is a measured bone's.
+pub fn measured_vertices(weights: &[VertexWeights], triangles: &[[u32; 3]]) -> Vec<bool> {
+    let mut used = vec![false; weights.len()];
+    for &vertex in triangles.iter().flatten() {
+        used[vertex as usize] = true;
+    }
+    let on_measured_bone = weights.iter().map(|weights| {
+        let largest = (0..4)
+            .rev()
+            .max_by(|&a, &b| weights.weights[a].total_cmp(&weights.weights[b]))
+            .expect("there are four slots");
+        MEASURED_BONES.contains(&weights.bones[largest])
+    });
+    on_measured_bone
+        .zip(used)
+        .map(|(on, used)| on && used)
         .collect()
 }
 
@@ -233,7 +237,7 @@ mod tests {
     #[test]
     fn head_hands_and_feet_are_not_measured() {
         let body = effigy_registration::smpl::builtin::body();
-        let measured = measured_vertices(&body);
+        let measured = measured_vertices(&body.skinning, &body.triangles);
         let (mut top, mut tip) = (Vec3::NEG_INFINITY, Vec3::NEG_INFINITY);
         for (vertex, _) in body
             .template

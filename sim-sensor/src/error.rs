@@ -1,4 +1,6 @@
-//! What can go wrong with a scenario.
+//! What can go wrong with a scenario or a data set.
+
+use std::path::PathBuf;
 
 use effigy_registration::RegistrationError;
 
@@ -8,6 +10,8 @@ pub enum SimError {
     Scenario { field: &'static str, got: String, expected: &'static str },
     #[error("scenario: not readable as JSON of version {expected_version}: {source}")]
     Json { expected_version: u32, source: serde_json::Error },
+    #[error("{path}: {problem}")]
+    Dataset { path: PathBuf, problem: String },
     #[error(transparent)]
     Motion(#[from] RegistrationError),
 }

@@ -5,6 +5,7 @@
 //! origin and the camera looks along -z. Everything follows from the scenario's seed, bit for bit.
 
 pub mod cloth;
+pub mod dataset;
 pub mod error;
 pub mod noise;
 pub mod person;

@@ -1,6 +1,7 @@
 //! One file a command.
 
 pub(crate) mod chain;
+pub(crate) mod dataset;
 pub(crate) mod demo;
 pub(crate) mod evaluate;
 pub(crate) mod export;

@@ -101,7 +101,6 @@ impl Judge<'_> {
         poses: Poses,
         surface_in_own_space: &dyn Fn(&BodyParams) -> TriangleMesh,
     ) -> anyhow::Result<SurfaceScores> {
-        let measured = metrics::measured_vertices(self.body);
         let mut sums = [0.0_f64; 4];
         let mut count = 0;
         for sample in samples {
@@ -110,6 +109,11 @@ impl Judge<'_> {
             let params = self.params_in_camera(sample, &true_frame, poses);
             let truth = moved(&true_frame.clothed_in_world, camera_from_sim);
             let predicted = surface_in_own_space(&params);
+            let weights = match &true_frame.in_cloth {
+                Some(cloth) => &cloth.weights,
+                None => &self.body.skinning,
+            };
+            let measured = metrics::measured_vertices(weights, &truth.triangles);
             let Some(scores) = metrics::surface_metrics(&truth, &measured, &predicted)? else {
                 continue;
             };

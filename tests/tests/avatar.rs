@@ -143,7 +143,7 @@ fn clothed_points_come_back_to_the_clothed_canonical_surface() {
 #[test]
 fn driving_a_perfect_field_gives_the_clothed_person_back() {
     let body = builtin::body();
-    let measured = measured_vertices(&body);
+    let measured = measured_vertices(&body.skinning, &body.triangles);
     for (frame, truth) in simulated(&FRAMES[..2]) {
         let canonicaliser = canonicaliser(&body, &truth);
         let subject = canonicaliser.subject();
@@ -230,7 +230,7 @@ fn a_fine_tuned_avatar_is_nearer_to_the_person_than_the_bare_body() {
     )
     .unwrap();
     let mut driver = Driver::new(Arc::new(avatar), DriveConfig::default());
-    let measured = measured_vertices(&body);
+    let measured = measured_vertices(&body.skinning, &body.triangles);
     for (frame, truth) in simulated(&[430, 520]) {
         let driven = driver.pose(&truth.params, frame.id());
         // `EFFIGY_PLY=folder` keeps the meshes, to look at.

@@ -1,0 +1,235 @@
+//! Who is in a data set, what they wear and do.
+
+use effigy_registration::motion::Routine;
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    person::OutfitKind,
+    random::Randomness,
+    scenario::{MotionChoice, Noise, Scenario},
+};
+
+/// What a data set is for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum DatasetPreset {
+    /// To learn a prior from: many people, few frames each.
+    Prior,
+    /// In the manner of CAPE: ten people to learn from, four to fine-tune and test on, actions split as in MetaAvatar.
+    CapeLike,
+    /// A miniature for tests.
+    Small,
+}
+
+/// Whether training may see a person.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Split {
+    Train,
+    Test,
+}
+
+/// What a test person's sequence is for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Role {
+    /// Fine-tuning draws its frames here; what it leaves tests interpolation.
+    FineTune,
+    /// Tests extrapolation: no frame of the action is learned from.
+    Extrapolation,
+}
+
+/// One person in one outfit doing one thing.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SequencePlan {
+    /// Also the file's name.
+    pub name: String,
+    pub split: Split,
+    pub role: Role,
+    pub subject: u32,
+    pub outfit: OutfitKind,
+    pub action: String,
+    /// Who, wearing what, doing what; `rate_hz` is the rate of the kept frames.
+    pub scenario: Scenario,
+    pub frames: u32,
+}
+
+/// A data set before it is made.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DatasetPlan {
+    pub preset: DatasetPreset,
+    pub seed: u64,
+    /// Star-pose offsets are rounded to this.
+    pub offset_step_m: f32,
+    pub sequences: Vec<SequencePlan>,
+}
+
+/// Test people have seeds that no training person can have.
+const TEST_SEEDS: u64 = 1 << 40;
+
+impl DatasetPlan {
+    pub fn new(preset: DatasetPreset, seed: u64) -> Self {
+        let (offset_step_m, sequences) = match preset {
+            DatasetPreset::Prior => (1e-3, prior(seed)),
+            DatasetPreset::CapeLike => (0.25e-3, cape_like(seed)),
+            DatasetPreset::Small => (0.25e-3, small(seed)),
+        };
+        Self { preset, seed, offset_step_m, sequences }
+    }
+
+    pub fn frame_count(&self) -> u64 {
+        let frames = self
+            .sequences
+            .iter()
+            .map(|sequence| u64::from(sequence.frames));
+        frames.sum()
+    }
+}
+
+/// People of all shapes in every outfit of the training split, each doing one thing.
+fn prior(seed: u64) -> Vec<SequencePlan> {
+    const PEOPLE: u32 = 60;
+    const FRAMES: u32 = 40;
+    let outfits = training_outfits();
+    let actions = [
+        Routine::Mixture,
+        Routine::WalkInPlace,
+        Routine::RaiseArms,
+        Routine::Squat,
+        Routine::Wave,
+    ];
+    let random = Randomness::new(seed, 0, 0xda7a);
+    (0..PEOPLE)
+        .map(|person| {
+            let outfit = outfits[person as usize % outfits.len()];
+            let start = random.uniform(person.into()) * actions.len() as f32;
+            let action = actions[start as usize % actions.len()];
+            let wearer = Wearer { split: Split::Train, subject: person, outfit };
+            sequence(seed, wearer, action, Role::FineTune, FRAMES)
+        })
+        .collect()
+}
+
+/// Ten people in two outfits each to learn from; four in two or three to fine-tune and test on.
+fn cape_like(seed: u64) -> Vec<SequencePlan> {
+    const TRAIN_PEOPLE: u32 = 10;
+    const TRAIN_FRAMES: u32 = 40;
+    const TEST_FRAMES: u32 = 60;
+    let outfits = training_outfits();
+    let mut sequences = Vec::new();
+    for subject in 0..TRAIN_PEOPLE {
+        for k in 0..2 {
+            let outfit = outfits[(subject as usize * 2 + k) % outfits.len()];
+            let wearer = Wearer { split: Split::Train, subject, outfit };
+            sequences.push(sequence(
+                seed,
+                wearer,
+                Routine::Mixture,
+                Role::FineTune,
+                TRAIN_FRAMES,
+            ));
+        }
+    }
+    for (subject, outfits) in (0..).zip(test_outfits()) {
+        for outfit in outfits {
+            let wearer = Wearer { split: Split::Test, subject, outfit };
+            for (action, role) in [
+                (Routine::TurnAround, Role::FineTune),
+                (Routine::Squat, Role::FineTune),
+                (Routine::WalkInPlace, Role::FineTune),
+                (Routine::RaiseArms, Role::Extrapolation),
+                (Routine::Wave, Role::Extrapolation),
+            ] {
+                sequences.push(sequence(seed, wearer, action, role, TEST_FRAMES));
+            }
+        }
+    }
+    sequences
+}
+
+fn small(seed: u64) -> Vec<SequencePlan> {
+    let training = Wearer { split: Split::Train, subject: 0, outfit: OutfitKind::CloseFitting };
+    let test = Wearer { split: Split::Test, subject: 0, outfit: OutfitKind::TshirtTrousers };
+    vec![
+        sequence(seed, training, Routine::Squat, Role::FineTune, 6),
+        sequence(seed, test, Routine::Squat, Role::FineTune, 6),
+        sequence(seed, test, Routine::RaiseArms, Role::Extrapolation, 6),
+    ]
+}
+
+/// Every kind of garment but the blazer, which only test people wear.
+fn training_outfits() -> [OutfitKind; 8] {
+    [
+        OutfitKind::TshirtTrousers,
+        OutfitKind::TshirtShorts,
+        OutfitKind::LongsleeveTrousers,
+        OutfitKind::LongsleeveWideTrousers,
+        OutfitKind::PoloTrousers,
+        OutfitKind::HoodieTrousers,
+        OutfitKind::Skirt,
+        OutfitKind::Dress,
+    ]
+}
+
+/// Of each test person.
+fn test_outfits() -> [Vec<OutfitKind>; 4] {
+    [
+        vec![OutfitKind::LongsleeveTrousers, OutfitKind::TshirtShorts],
+        vec![
+            OutfitKind::PoloTrousers,
+            OutfitKind::TshirtTrousers,
+            OutfitKind::Skirt,
+        ],
+        vec![
+            OutfitKind::HoodieTrousers,
+            OutfitKind::LongsleeveWideTrousers,
+        ],
+        vec![OutfitKind::BlazerTrousers, OutfitKind::LongsleeveTrousers],
+    ]
+}
+
+/// Somebody in something.
+#[derive(Clone, Copy, Debug)]
+struct Wearer {
+    split: Split,
+    subject: u32,
+    outfit: OutfitKind,
+}
+
+fn sequence(seed: u64, wearer: Wearer, action: Routine, role: Role, frames: u32) -> SequencePlan {
+    /// Kept frames a second: CAPE's 60 Hz, every fifth frame.
+    const RATE_HZ: f32 = 12.0;
+    let Wearer { split, subject, outfit } = wearer;
+    let first = match split {
+        Split::Train => 0,
+        Split::Test => TEST_SEEDS,
+    };
+    let who = seed
+        .wrapping_mul(1_000_003)
+        .wrapping_add(first + u64::from(subject));
+    let (outfit_name, action_name) = (outfit.name(), action.name());
+    let split_name = match split {
+        Split::Train => "train",
+        Split::Test => "test",
+    };
+    SequencePlan {
+        name: format!("{split_name}-{subject:03}-{outfit_name}-{action_name}"),
+        split,
+        role,
+        subject,
+        outfit,
+        action: action_name.to_owned(),
+        scenario: Scenario {
+            seed: who,
+            motion: MotionChoice::Routine(action),
+            outfit,
+            seconds: frames as f32 / RATE_HZ,
+            rate_hz: Some(RATE_HZ),
+            noise: Noise::None,
+            ..Scenario::default()
+        },
+        frames,
+    }
+}
