@@ -27,7 +27,6 @@ fn main() -> Result<(), Box<dyn Error>> {
         motion: choice,
         outfit: named::<OutfitKind>(&outfit)?,
         sensor: named::<SensorPreset>(&sensor)?,
-        color: true,
         ..Scenario::default()
     };
     let sheet = draw(&scenario)?;
@@ -57,13 +56,14 @@ fn draw(scenario: &Scenario) -> Result<image::RgbImage, Box<dyn Error>> {
     let mut sheet = image::RgbImage::new(crop * COLUMNS, size.height * 2);
     for column in 0..COLUMNS {
         let at_secs = secs * (column as f32 + 0.5) / COLUMNS as f32;
-        let frame = sensor.expose(FrameId((at_secs * scenario.rate_hz()) as u64))?;
-        let color = frame.color.expect("the scenario asks for colour");
+        let id = FrameId((at_secs * scenario.rate_hz()) as u64);
+        let frame = sensor.expose(id)?;
+        let color = sensor.view(id).shaded();
         for y in 0..size.height {
             for x in 0..crop {
                 let pixel = (y * size.width + left + x) as usize;
                 let to = column * crop + x;
-                sheet.put_pixel(to, y, image::Rgb(color.pixels()[pixel]));
+                sheet.put_pixel(to, y, image::Rgb(color[pixel]));
                 let grey = brightness(frame.depth.pixels()[pixel]);
                 sheet.put_pixel(to, size.height + y, image::Rgb(grey));
             }

@@ -7,6 +7,7 @@
 pub mod cloth;
 pub mod dataset;
 pub mod error;
+pub mod measure;
 pub mod noise;
 pub mod person;
 pub mod population;

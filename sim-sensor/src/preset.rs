@@ -1,7 +1,7 @@
 //! The sensors on offer: what they are, and where the simulator puts them.
 
-use effigy_capture::{Calibration, Intrinsics, Rigid3, SensorModel};
-use glam::{Quat, Vec3, vec3};
+use effigy_capture::{Calibration, CameraModel, Distortion, Intrinsics, Rigid3, SensorModel};
+use glam::{EulerRot, Quat, Vec3, vec3};
 use serde::{Deserialize, Serialize};
 
 use crate::noise::{
@@ -86,6 +86,59 @@ impl SensorPreset {
         }
     }
 
+    /// The colour camera: a lens of its own, at the smallest size the sensor streams in.
+    pub fn color_camera(self) -> CameraModel {
+        let (width, height, focal_px, lens) = match self {
+            Self::Azure => (
+                1280,
+                720,
+                608.0,
+                [0.52, -2.65, 4.2e-4, -1.6e-4, 1.52, 0.40, -2.47, 1.44],
+            ),
+            Self::D435 => (
+                640,
+                480,
+                616.0,
+                [0.12, -0.25, 6.0e-4, -3.0e-4, 0.0, 0.0, 0.0, 0.0],
+            ),
+            Self::Oak => (
+                640,
+                360,
+                462.0,
+                [0.09, -0.18, 2.0e-4, 5.0e-4, 0.0, 0.0, 0.0, 0.0],
+            ),
+            Self::Kinect => (
+                640,
+                480,
+                525.0,
+                [0.26, -0.78, -1.0e-3, 2.0e-3, 0.92, 0.0, 0.0, 0.0],
+            ),
+        };
+        // Nobody's lens sits exactly in the middle.
+        let intrinsics = Intrinsics {
+            width,
+            height,
+            fx: focal_px,
+            fy: focal_px * 0.999,
+            cx: (width - 1) as f32 * 0.5 + 3.2,
+            cy: (height - 1) as f32 * 0.5 - 2.1,
+        };
+        CameraModel { intrinsics, distortion: Distortion::BrownConrady(lens) }
+    }
+
+    /// Where the colour camera sits beside the depth camera, and how it is turned.
+    pub fn color_from_depth(self) -> Rigid3 {
+        let (aside_m, turned_rad) = match self {
+            // The Azure's colour camera looks up from the tilted depth camera by 6 degrees.
+            Self::Azure => (vec3(-0.032, -0.002, 0.004), [0.105, 0.002, -0.001]),
+            Self::D435 => (vec3(0.015, 0.0, 0.0), [0.004, -0.003, 0.002]),
+            Self::Oak => (vec3(-0.0375, 0.0, 0.001), [0.002, 0.005, -0.001]),
+            Self::Kinect => (vec3(-0.025, 0.0, -0.001), [-0.006, 0.004, 0.001]),
+        };
+        let [x, y, z] = turned_rad;
+        Rigid3 { rotation: Quat::from_euler(EulerRot::XYZ, x, y, z), translation: aside_m }
+    }
+
     pub fn range_m(self) -> [f32; 2] {
         match self {
             Self::Azure => [0.5, 3.86],
@@ -114,9 +167,13 @@ impl SensorPreset {
             Self::D435 => {
                 Defects::Stereo(Stereo { steps_per_px: 32.0, window_px: 7, ..Stereo::of(model) })
             }
-            Self::Oak => {
-                Defects::Stereo(Stereo { steps_per_px: 8.0, window_px: 7, ..Stereo::of(model) })
-            }
+            // Without a projector, plain cloth and walls leave windows with nothing to match.
+            Self::Oak => Defects::Stereo(Stereo {
+                steps_per_px: 8.0,
+                window_px: 7,
+                hole_share: 0.03,
+                ..Stereo::of(model)
+            }),
             Self::Kinect => Defects::StructuredLight(StructuredLight::kinect()),
         }
     }

@@ -26,10 +26,12 @@ pub struct Scenario {
     pub rate_hz: Option<f32>,
     pub noise: Noise,
     pub room: Room,
-    /// Whether frames carry a colour image.
+    /// Whether frames carry an image of the sensor's colour camera.
     pub color: bool,
     /// Share of frames that never arrive; their numbers are missing in the stream.
     pub dropped_share: f32,
+    /// Share of frames exposed too late, by up to most of a frame; their timestamps say so.
+    pub late_share: f32,
 }
 
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -79,6 +81,7 @@ impl Default for Scenario {
             room: Room::FloorAndWall,
             color: false,
             dropped_share: 0.0,
+            late_share: 0.0,
         }
     }
 }
@@ -144,6 +147,8 @@ impl Scenario {
             format!("{:?}", self.fit),
             "0 (tight) to 1 (loose)",
         )?;
+        let late = (0.0..=1.0).contains(&self.late_share);
+        check(late, "late_share", self.late_share.to_string(), "0 to 1")?;
         let betas = self
             .betas
             .is_none_or(|b| b.iter().all(|beta| beta.abs() <= 5.0));

@@ -39,7 +39,10 @@ impl Scene {
         let cloth = worn(&scenario, &mut person);
         let mut calibration = scenario.sensor.calibration();
         calibration.rate_hz = scenario.rate_hz();
-        calibration.color = scenario.color.then_some(calibration.depth);
+        if scenario.color {
+            calibration.color = Some(scenario.sensor.color_camera());
+            calibration.color_from_depth = scenario.sensor.color_from_depth();
+        }
         let rest = person.rest_body();
         let motion = match &scenario.motion {
             MotionChoice::Routine(routine) => {
@@ -57,8 +60,22 @@ impl Scene {
         self.motion.duration_secs()
     }
 
+    /// When a frame was exposed; never before the one in front of it.
     pub(crate) fn timestamp(&self, frame: FrameId) -> Timestamp {
-        Timestamp::from_secs_f64(frame.0 as f64 / f64::from(self.scenario.rate_hz()))
+        let frames = frame.0 as f64 + f64::from(self.lateness(frame));
+        Timestamp::from_secs_f64(frames / f64::from(self.scenario.rate_hz()))
+    }
+
+    /// In frames, below one.
+    fn lateness(&self, frame: FrameId) -> f32 {
+        const MOST: f32 = 0.9;
+        let random = Randomness::new(self.scenario.seed, 1, 0xd0);
+        let late = frame.0 > 0 && random.uniform(2 * frame.0) < self.scenario.late_share;
+        if late {
+            MOST * random.uniform(2 * frame.0 + 1)
+        } else {
+            0.0
+        }
     }
 
     /// Movements end as they begin, so they repeat for as long as the scenario lasts.

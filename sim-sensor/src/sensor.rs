@@ -2,15 +2,13 @@
 
 use std::sync::Arc;
 
-use effigy_capture::{
-    Calibration, CaptureError, ColorImage, DepthImage, Frame, FrameId, FrameSource,
-};
+use effigy_capture::{Calibration, CaptureError, DepthImage, Frame, FrameId, FrameSource};
 use effigy_registration::BodyModel;
 
 use crate::{
     error::SimError,
     noise,
-    render::{Renderer, View},
+    render::{ColorCamera, Renderer, View},
     scenario::{Noise, Scenario},
     scene::Scene,
 };
@@ -23,6 +21,7 @@ pub struct SimulatedSensor {
     scene: Scene,
     renderer: Renderer,
     exposure: noise::Exposure,
+    color: Option<ColorCamera>,
     next: u64,
 }
 
@@ -35,45 +34,51 @@ impl SimulatedSensor {
             renderer = renderer.two_sided();
         }
         let exposure = noise::Exposure::new(&scene.calibration, scene.scenario.sensor.defects());
-        Ok(Self { scene, renderer, exposure, next: 0 })
+        let color = scene.calibration.color.map(|camera| {
+            let depth_from_color = scene.calibration.color_from_depth.inverse();
+            let world_from_color = scene.world_from_camera * depth_from_color;
+            let color = ColorCamera::new(&camera, world_from_color, scene.scenario.room);
+            if scene.is_in_cloth() {
+                color.two_sided()
+            } else {
+                color
+            }
+        });
+        Ok(Self { scene, renderer, exposure, color, next: 0 })
     }
 
     /// What an ideal sensor would see in one frame: true depth, normals, labels, colour.
     pub fn view(&mut self, frame: FrameId) -> &View {
-        draw(&mut self.renderer, &self.scene, frame)
+        draw(&mut self.renderer, &self.scene, Subject::Person(frame))
     }
 
     /// One frame by number, in any order. With simulated clothes a frame far ahead costs the frames between.
     pub fn expose(&mut self, id: FrameId) -> Result<Frame, CaptureError> {
-        let view = draw(&mut self.renderer, &self.scene, id);
-        Self::delivered(&self.scene, &mut self.exposure, view, id)
+        self.expose_subject(id, Subject::Person(id))
     }
 
     /// The same moment's frame with nobody in the room.
     pub fn expose_room(&mut self, id: FrameId) -> Result<Frame, CaptureError> {
-        let view = self.renderer.render_room();
-        Self::delivered(&self.scene, &mut self.exposure, view, id)
+        self.expose_subject(id, Subject::Nobody)
     }
 
-    fn delivered(
-        scene: &Scene,
-        exposure: &mut noise::Exposure,
-        view: &View,
-        id: FrameId,
-    ) -> Result<Frame, CaptureError> {
-        let raw = match scene.scenario.noise {
-            Noise::Sensor => exposure.expose(view, scene.scenario.seed, id),
-            Noise::None => exposure.truth(view),
+    fn expose_subject(&mut self, id: FrameId, subject: Subject) -> Result<Frame, CaptureError> {
+        let view = draw(&mut self.renderer, &self.scene, subject);
+        let raw = match self.scene.scenario.noise {
+            Noise::Sensor => self.exposure.expose(view, self.scene.scenario.seed, id),
+            Noise::None => self.exposure.truth(view),
         };
         let (width, height) = (view.width as u32, view.height as u32);
-        let color = if scene.scenario.color {
-            Some(Arc::new(ColorImage::new(width, height, view.shaded())?))
-        } else {
-            None
+        let color = match &mut self.color {
+            Some(camera) => {
+                let shaded = draw(camera.renderer(), &self.scene, subject).shaded();
+                Some(Arc::new(camera.through_lens(&shaded)?))
+            }
+            None => None,
         };
         Ok(Frame {
             id,
-            timestamp: scene.timestamp(id),
+            timestamp: self.scene.timestamp(id),
             depth: Arc::new(DepthImage::new(width, height, raw)?),
             color,
         })
@@ -89,7 +94,17 @@ impl SimulatedSensor {
     }
 }
 
-fn draw<'a>(renderer: &'a mut Renderer, scene: &Scene, frame: FrameId) -> &'a View {
+/// Who is in front of the camera.
+#[derive(Clone, Copy)]
+enum Subject {
+    Person(FrameId),
+    Nobody,
+}
+
+fn draw<'a>(renderer: &'a mut Renderer, scene: &Scene, subject: Subject) -> &'a View {
+    let Subject::Person(frame) = subject else {
+        return renderer.render_room();
+    };
     let person = &scene.person;
     if let Some(surface) = scene.in_cloth(frame) {
         return renderer.render(&surface.posed, &person.paint, &surface.weights);

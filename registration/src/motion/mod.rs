@@ -4,14 +4,19 @@ use glam::{Quat, Vec3};
 
 use crate::smpl::JOINT_COUNT;
 
+pub mod amc;
 pub mod bvh;
+mod file;
 pub mod library;
 mod puppet;
 mod rest_body;
 mod retarget;
+pub mod smpl_file;
 
+pub use file::{MAX_BYTES, MAX_FRAMES, open};
 pub use library::Routine;
 pub use rest_body::RestBody;
+pub use retarget::{JointMap, limb_alignments};
 
 /// Movement of the whole body slower than this counts as travel.
 const WANDER_SECS: f32 = 0.6;

@@ -9,7 +9,7 @@ use std::path::Path;
 
 use glam::{Mat3, Quat, Vec3};
 
-use super::{Motion, MotionPose, RestBody, bvh::BvhClip, short_axis_angle};
+use super::{Motion, MotionPose, RestBody, short_axis_angle};
 use crate::{
     error::RegistrationError,
     smpl::{JOINT_COUNT, JOINT_NAMES, PARENTS},
@@ -17,7 +17,23 @@ use crate::{
 
 mod names;
 
-use names::JointMap;
+pub use names::JointMap;
+
+/// A skeleton and what it does, in a file's own units and axes; parents come before their children.
+pub(super) trait Clip {
+    fn names(&self) -> Vec<&str>;
+    fn parents(&self) -> Vec<Option<usize>>;
+    fn frame_count(&self) -> usize;
+    fn frame_secs(&self) -> f32;
+    /// Positions of all joints with every rotation zero.
+    fn rest_positions(&self) -> Vec<Vec3>;
+    /// Rotation and position of every joint in one frame, in the space of the file.
+    fn global_pose(&self, frame: usize) -> Vec<(Quat, Vec3)>;
+    /// Whether feet at rest are tilted as their shins are; otherwise they are flat.
+    fn feet_follow_shins(&self) -> bool {
+        false
+    }
+}
 
 /// A first frame further than this from the second is a calibration pose, not part of the motion.
 const CALIBRATION_JUMP_RAD: f32 = 0.5;
@@ -26,37 +42,42 @@ const FLOOR_PERCENTILE: f32 = 0.02;
 
 pub(super) fn onto_smpl(
     path: &Path,
-    clip: &BvhClip,
+    clip: &dyn Clip,
     rest: &RestBody,
 ) -> Result<Motion, RegistrationError> {
-    let map = JointMap::find(clip).map_err(|missing| RegistrationError::MotionFile {
-        path: path.to_path_buf(),
-        line: 0,
-        expected: format!(
-            "a joint for SMPL's `{}`, under one of the names {}",
-            JOINT_NAMES[missing],
-            names::known_names(missing)
-        ),
-        found: clip
-            .joints
-            .iter()
-            .map(|j| j.name.as_str())
-            .collect::<Vec<_>>()
-            .join(", "),
+    let map = JointMap::find(&clip.names(), &clip.parents()).map_err(|missing| {
+        RegistrationError::MotionFile {
+            path: path.to_path_buf(),
+            line: 0,
+            expected: format!(
+                "a joint for SMPL's `{}`, under one of the names {}",
+                JOINT_NAMES[missing],
+                JointMap::known_names(missing)
+            ),
+            found: clip.names().join(", "),
+        }
     })?;
     let source = SourceRest::measure(clip, &map);
-    let alignments = alignments(&source, &map, rest);
+    let their_rest = map
+        .0
+        .map(|joint| joint.map(|joint| source.positions[joint]));
+    let mut alignments = limb_alignments(&their_rest, &rest.joints);
+    if clip.feet_follow_shins() {
+        for foot in [7, 8, 10, 11] {
+            alignments[foot] = alignments[4 + (foot - 7) % 3];
+        }
+    }
     let metres_per_unit = source.metres_per_unit(rest);
     let retargeting = Retargeting { map, source, alignments, metres_per_unit };
     let start = usize::from(first_frame_is_calibration(clip));
-    let mut poses: Vec<MotionPose> = (start..clip.frames.len())
+    let mut poses: Vec<MotionPose> = (start..clip.frame_count())
         .map(|frame| retargeting.pose(&clip.global_pose(frame), rest))
         .collect();
     put_on_floor(&mut poses, rest);
     let name = path
         .file_stem()
         .map_or_else(String::new, |s| s.to_string_lossy().into_owned());
-    Ok(Motion { name, rate_hz: 1.0 / clip.frame_secs, poses })
+    Ok(Motion { name, rate_hz: 1.0 / clip.frame_secs(), poses })
 }
 
 /// The source's rest pose in our axes (y up, facing +z), in the file's unit.
@@ -67,7 +88,7 @@ struct SourceRest {
 }
 
 impl SourceRest {
-    fn measure(clip: &BvhClip, map: &JointMap) -> Self {
+    fn measure(clip: &dyn Clip, map: &JointMap) -> Self {
         let in_file = clip.rest_positions();
         let at = |smpl: usize| map.0[smpl].map(|joint| in_file[joint]);
         let between = |from: usize, to: usize| match (at(from), at(to)) {
@@ -97,7 +118,7 @@ impl SourceRest {
 }
 
 /// The signed coordinate axis closest to a direction; y for none.
-fn nearest_axis(direction: Vec3) -> Vec3 {
+pub(super) fn nearest_axis(direction: Vec3) -> Vec3 {
     [
         Vec3::Y,
         Vec3::NEG_Y,
@@ -116,8 +137,11 @@ fn nearest_axis(direction: Vec3) -> Vec3 {
     })
 }
 
-/// `A` for each SMPL joint.
-fn alignments(source: &SourceRest, map: &JointMap, rest: &RestBody) -> [Quat; JOINT_COUNT] {
+/// `A` for each SMPL joint: turns the bones of our rest pose onto another skeleton's, in one space.
+pub fn limb_alignments(
+    their_rest: &[Option<Vec3>; JOINT_COUNT],
+    our_rest: &[Vec3; JOINT_COUNT],
+) -> [Quat; JOINT_COUNT] {
     let mut alignments = [Quat::IDENTITY; JOINT_COUNT];
     // Hips, knees, shoulders, elbows, each with the joint at the end of its bone.
     for (joint, end) in [
@@ -130,11 +154,11 @@ fn alignments(source: &SourceRest, map: &JointMap, rest: &RestBody) -> [Quat; JO
         (18, 20),
         (19, 21),
     ] {
-        let (Some(from), Some(to)) = (map.0[joint], map.0[end]) else {
+        let (Some(from), Some(to)) = (their_rest[joint], their_rest[end]) else {
             continue;
         };
-        let theirs = source.positions[to] - source.positions[from];
-        let ours = rest.joints[end] - rest.joints[joint];
+        let theirs = to - from;
+        let ours = our_rest[end] - our_rest[joint];
         if let (Some(ours), Some(theirs)) = (ours.try_normalize(), theirs.try_normalize()) {
             alignments[joint] = Quat::from_rotation_arc(ours, theirs);
         }
@@ -176,8 +200,8 @@ impl Retargeting {
     }
 }
 
-fn first_frame_is_calibration(clip: &BvhClip) -> bool {
-    if clip.frames.len() < 3 {
+fn first_frame_is_calibration(clip: &dyn Clip) -> bool {
+    if clip.frame_count() < 3 {
         return false;
     }
     let (first, second) = (clip.global_pose(0), clip.global_pose(1));
@@ -189,7 +213,7 @@ fn first_frame_is_calibration(clip: &BvhClip) -> bool {
 }
 
 /// One height for all: jumps stay jumps. Then nobody is left standing in the floor.
-fn put_on_floor(poses: &mut [MotionPose], rest: &RestBody) {
+pub(super) fn put_on_floor(poses: &mut [MotionPose], rest: &RestBody) {
     let mut lowest: Vec<f32> = poses
         .iter()
         .map(|pose| rest.lowest_point_m(&pose.theta) + pose.trans.y)

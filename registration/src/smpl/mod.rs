@@ -11,7 +11,7 @@ mod lbs;
 mod load;
 pub mod mirror;
 mod model;
-mod npz;
+pub(crate) mod npz;
 mod params;
 mod parts;
 mod poser;

@@ -17,19 +17,19 @@ const LARGEST_ARRAY_BYTES: u64 = 128 << 20;
 const LARGEST_HEADER_BYTES: usize = 64 << 10;
 
 /// An open archive.
-pub(super) struct Npz {
+pub(crate) struct Npz {
     path: PathBuf,
     archive: ZipArchive<BufReader<File>>,
 }
 
 /// A real array in row-major order.
-pub(super) struct Array {
-    pub(super) shape: Vec<usize>,
-    pub(super) data: Vec<f64>,
+pub(crate) struct Array {
+    pub(crate) shape: Vec<usize>,
+    pub(crate) data: Vec<f64>,
 }
 
 impl Npz {
-    pub(super) fn open(path: &Path) -> Result<Self, RegistrationError> {
+    pub(crate) fn open(path: &Path) -> Result<Self, RegistrationError> {
         let file = File::open(path)
             .map_err(|source| RegistrationError::Io { path: path.to_owned(), source })?;
         let archive = ZipArchive::new(BufReader::new(file)).map_err(|error| {
@@ -38,12 +38,12 @@ impl Npz {
         Ok(Self { path: path.to_owned(), archive })
     }
 
-    pub(super) fn has(&self, array: &str) -> bool {
+    pub(crate) fn has(&self, array: &str) -> bool {
         self.archive.index_for_name(&file_name(array)).is_some()
     }
 
     /// The array of this name; every number is finite.
-    pub(super) fn array(&mut self, array: &'static str) -> Result<Array, RegistrationError> {
+    pub(crate) fn array(&mut self, array: &'static str) -> Result<Array, RegistrationError> {
         let bytes = self.bytes(array)?;
         let parsed =
             parse(&bytes).map_err(|found| self.wrong(array, "an array of numbers", found))?;
@@ -55,7 +55,7 @@ impl Npz {
     }
 
     /// As [`Self::array`], of a shape in which `None` stands for any length.
-    pub(super) fn shaped(
+    pub(crate) fn shaped(
         &mut self,
         array: &'static str,
         shape: &[Option<usize>],
@@ -78,7 +78,7 @@ impl Npz {
         Err(self.wrong(array, &expected, format!("shape {:?}", parsed.shape)))
     }
 
-    pub(super) fn wrong(
+    pub(crate) fn wrong(
         &self,
         array: &'static str,
         expected: &str,

@@ -7,6 +7,8 @@ use effigy_capture::{Calibration, FrameId};
 
 use crate::{preset::Defects, random::Randomness, render::View};
 
+mod correlated;
+pub mod multi_path;
 pub mod stereo;
 pub mod structured_light;
 pub mod time_of_flight;
@@ -17,6 +19,8 @@ pub struct Exposure {
     range_m: [f32; 2],
     metres_per_unit: f32,
     stereo: stereo::Buffers,
+    structured_light: structured_light::Buffers,
+    time_of_flight: time_of_flight::Buffers,
 }
 
 /// What the kinds of sensor need to know about a frame.
@@ -39,6 +43,8 @@ impl Exposure {
             range_m: calibration.range_m,
             metres_per_unit: calibration.metres_per_unit,
             stereo: stereo::Buffers::default(),
+            structured_light: structured_light::Buffers::default(),
+            time_of_flight: time_of_flight::Buffers::default(),
         }
     }
 
@@ -47,9 +53,13 @@ impl Exposure {
         let shot = Shot { seed, frame: frame.0 };
         let mut metres = vec![0.0; view.depth_m.len()];
         match &self.defects {
-            Defects::TimeOfFlight(sensor) => sensor.expose(view, shot, &mut metres),
+            Defects::TimeOfFlight(sensor) => {
+                sensor.expose(view, shot, &mut self.time_of_flight, &mut metres);
+            }
             Defects::Stereo(sensor) => sensor.expose(view, shot, &mut self.stereo, &mut metres),
-            Defects::StructuredLight(sensor) => sensor.expose(view, shot, &mut metres),
+            Defects::StructuredLight(sensor) => {
+                sensor.expose(view, shot, &mut self.structured_light, &mut metres);
+            }
         }
         self.quantised(&metres)
     }

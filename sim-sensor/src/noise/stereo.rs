@@ -2,7 +2,10 @@
 
 use effigy_capture::SensorModel;
 
-use super::Shot;
+use super::{
+    Shot,
+    correlated::{correlated_noise, normal_threshold},
+};
 use crate::render::View;
 
 /// How a stereo camera errs.
@@ -19,7 +22,7 @@ pub struct Stereo {
     pub dark_reflectance: f32,
     /// Cosine of incidence below which matches fail.
     pub least_cosine: f32,
-    /// Share of windows that fail for no visible reason.
+    /// Share of windows that fail for want of texture; a projector that paints dots leaves few.
     pub hole_share: f32,
 }
 
@@ -35,6 +38,8 @@ pub struct Buffers {
 
 /// A step in disparity that makes two surfaces of it.
 const EDGE_STEP_PX: f32 = 1.0;
+/// How much an edge wobbles: deviation as a share of its growth.
+const WOBBLE: f32 = 0.3;
 
 impl Stereo {
     /// A camera after a stereo model; other models give one that sees nothing amiss.
@@ -72,10 +77,11 @@ impl Stereo {
                 .iter()
                 .map(|&z| if z > 0.0 { focal_baseline / z } else { 0.0 }),
         );
+        let radius = (self.window_px / 3).max(1);
         correlated_noise(
             shot,
             0x57e,
-            self.window_px,
+            radius,
             size,
             &mut buffers.noise,
             &mut buffers.scratch,
@@ -83,7 +89,7 @@ impl Stereo {
         correlated_noise(
             shot,
             0x57f,
-            self.window_px,
+            radius,
             size,
             &mut buffers.texture,
             &mut buffers.scratch,
@@ -107,7 +113,7 @@ impl Stereo {
                 }
                 // The second imager sees this point at x - d; somebody nearer may stand in the way.
                 let matched = x as f32 - ideal;
-                let hidden = matched > nearest_match + 0.5;
+                let hidden = matched > nearest_match;
                 nearest_match = nearest_match.min(matched);
                 if hidden || buffers.texture[pixel] < least_texture + self.weakness(view, pixel) {
                     continue;
@@ -140,30 +146,17 @@ impl Stereo {
         5.0 * (darkness + slant)
     }
 
-    /// A window that straddles an edge takes the nearer surface's disparity: objects grow at their edges.
+    /// A window that straddles an edge takes the nearer surface's disparity: objects grow at their edges, by half
+    /// a window on average, and the edge wobbles with the texture around it.
     fn fatten(&self, [width, height]: [usize; 2], buffers: &mut Buffers) {
-        let reach = self.window_px / 2;
+        let mean_px = self.window_px as f32 * 0.5;
         buffers.fattened.clone_from(&buffers.disparity);
         for y in 0..height {
             for x in 0..width {
                 let pixel = y * width + x;
-                // The edge wobbles with the texture around it, from nothing to half a window.
-                let grown = (reach as f32 * (0.5 + 0.35 * buffers.texture[pixel])).round();
-                let grown = (grown.max(0.0) as usize).min(reach);
-                if grown == 0 {
-                    continue;
-                }
-                let (low, high) = (x.saturating_sub(grown), (x + grown).min(width - 1));
-                let (up, down) = (y.saturating_sub(grown), (y + grown).min(height - 1));
-                let nearest = [
-                    y * width + low,
-                    y * width + high,
-                    up * width + x,
-                    down * width + x,
-                ]
-                .iter()
-                .map(|&p| buffers.disparity[p])
-                .fold(buffers.disparity[pixel], f32::max);
+                let grown_px = mean_px + WOBBLE * mean_px * buffers.texture[pixel];
+                let grown = (grown_px.round().max(0.0) as usize).min(self.window_px);
+                let nearest = nearest_around([x, y], grown, [width, height], buffers);
                 if nearest > buffers.disparity[pixel] + EDGE_STEP_PX {
                     buffers.fattened[pixel] = nearest;
                 }
@@ -172,72 +165,25 @@ impl Stereo {
     }
 }
 
-/// Normal noise of deviation 1, alike over a window: white noise under two boxes, so that likeness fades
-/// instead of breaking off. Sums of 25 x 25 and more even numbers are as good as normal.
-fn correlated_noise(
-    shot: Shot,
-    purpose: u64,
-    window_px: usize,
+/// The largest disparity at a distance along rows and columns, and half of it: a thin thing is not stepped over.
+fn nearest_around(
+    [x, y]: [usize; 2],
+    grown: usize,
     [width, height]: [usize; 2],
-    noise: &mut Vec<f32>,
-    scratch: &mut Vec<f32>,
-) {
-    let random = shot.randomness(purpose);
-    let radius = (window_px / 3).max(1);
-    let n = (2 * radius + 1) as f32;
-    // What two boxes leave of white noise's variance, along each axis.
-    let kept: f32 = (1..2 * n as i32)
-        .map(|k| (n - (k as f32 - n).abs()) / (n * n))
-        .map(|weight| weight * weight)
-        .sum();
-    let gain = 12f32.sqrt() / kept;
-    noise.clear();
-    noise.extend((0..width * height).map(|pixel| (random.uniform(pixel as u64) - 0.5) * gain));
-    for _ in 0..2 {
-        box_rows(noise, scratch, [width, height], radius);
-        box_columns(scratch, noise, [width, height], radius);
-    }
-}
-
-/// A moving mean along rows. The border wraps around, which keeps the variance there.
-fn box_rows(from: &[f32], to: &mut Vec<f32>, [width, height]: [usize; 2], radius: usize) {
-    to.resize(width * height, 0.0);
-    let share = 1.0 / (2 * radius + 1) as f32;
-    let mut padded = vec![0.0; width + 2 * radius];
-    for y in 0..height {
-        let row = &from[y * width..(y + 1) * width];
-        padded[..radius].copy_from_slice(&row[width - radius..]);
-        padded[radius..width + radius].copy_from_slice(row);
-        padded[width + radius..].copy_from_slice(&row[..radius]);
-        add_shifted(
-            &mut to[y * width..(y + 1) * width],
-            share,
-            (0..=2 * radius).map(|k| &padded[k..]),
-        );
-    }
-}
-
-/// A moving mean along columns, wrapping likewise.
-fn box_columns(from: &[f32], to: &mut Vec<f32>, [width, height]: [usize; 2], radius: usize) {
-    to.resize(width * height, 0.0);
-    let share = 1.0 / (2 * radius + 1) as f32;
-    for y in 0..height {
-        let rows = (0..=2 * radius).map(|k| &from[(y + k + height - radius) % height * width..]);
-        add_shifted(&mut to[y * width..(y + 1) * width], share, rows);
-    }
-}
-
-fn add_shifted<'a>(out: &mut [f32], share: f32, terms: impl Iterator<Item = &'a [f32]>) {
-    out.fill(0.0);
-    for term in terms {
-        for (sum, value) in out.iter_mut().zip(term) {
-            *sum += value * share;
+    buffers: &Buffers,
+) -> f32 {
+    let mut nearest = 0.0f32;
+    for reach in [grown, grown / 2] {
+        let (low, high) = (x.saturating_sub(reach), (x + reach).min(width - 1));
+        let (up, down) = (y.saturating_sub(reach), (y + reach).min(height - 1));
+        for at in [
+            y * width + low,
+            y * width + high,
+            up * width + x,
+            down * width + x,
+        ] {
+            nearest = nearest.max(buffers.disparity[at]);
         }
     }
-}
-
-/// The value below minus which a standard normal falls with this probability; enough for shares of 1e-4 to 0.1.
-fn normal_threshold(share: f32) -> f32 {
-    let t = (-2.0 * share.clamp(1e-6, 0.4).ln()).sqrt();
-    t - (2.30753 + 0.27061 * t) / (1.0 + 0.99229 * t + 0.04481 * t * t)
+    nearest
 }

@@ -8,9 +8,11 @@ use effigy_fusion::mesh::{
 use effigy_registration::smpl::VertexWeights;
 use glam::{Vec3, vec3};
 
+mod color;
 mod label;
 mod room;
 
+pub use color::ColorCamera;
 pub use label::Label;
 
 use crate::{person::Paint, scenario::Room};

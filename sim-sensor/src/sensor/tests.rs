@@ -87,6 +87,88 @@ fn dropped_frames_leave_gaps_and_the_count_knows_it() {
     assert!(ids.is_sorted() && ids[0] == 0);
 }
 
+#[test]
+fn late_frames_say_when_they_were_exposed_and_show_that_moment() {
+    let scenario = Scenario {
+        seconds: 2.0,
+        late_share: 0.3,
+        noise: Noise::None,
+        ..scenario(SensorPreset::Oak, Routine::WalkInPlace)
+    };
+    let sensor = SimulatedSensor::new(&scenario, builtin::body()).unwrap();
+    let truth = Truth::new(&scenario, builtin::body()).unwrap();
+    let on_time = Truth::new(&Scenario { late_share: 0.0, ..scenario }, builtin::body()).unwrap();
+    let secs = |truth: &Truth, id| truth.at(FrameId(id)).timestamp.as_secs_f64();
+    let late: Vec<u64> = (0..60)
+        .filter(|&id| secs(&truth, id) > secs(&on_time, id) + 1e-6)
+        .collect();
+    assert!(
+        late.len() > 8 && late.len() < 30,
+        "about 30 % of 60: {late:?}"
+    );
+    for id in 1..60 {
+        assert!(
+            secs(&truth, id) > secs(&truth, id - 1),
+            "never before the frame in front"
+        );
+    }
+    let [a, b] = [&truth, &on_time].map(|t| t.params(FrameId(late[3])));
+    assert_ne!(a, b, "the body has moved on by then");
+    assert_eq!(sensor.frame_count(), Some(60));
+}
+
+/// The colour image is looked up through the calibration, as a user would do it.
+#[test]
+fn the_colour_cameras_place_and_lens_are_those_of_the_calibration() {
+    for preset in SensorPreset::ALL {
+        let scenario = Scenario {
+            color: true,
+            noise: Noise::None,
+            room: Room::Empty,
+            ..scenario(preset, Routine::Wave)
+        };
+        let mut sensor = SimulatedSensor::new(&scenario, builtin::body()).unwrap();
+        let picture = sensor.expose(FrameId(40)).unwrap().color.unwrap();
+        let calibration = sensor.calibration().clone();
+        let camera = calibration.color.unwrap();
+        let view = sensor.view(FrameId(40)).clone();
+        let share = |color_from_depth: effigy_capture::Rigid3| {
+            let (mut alike, mut all) = (0.0, 0.0);
+            for pixel in (0..view.depth_m.len()).step_by(5) {
+                let Some(point) = view.point(pixel) else {
+                    continue;
+                };
+                let at = camera.project(color_from_depth * point).round();
+                let inside = at.x >= 0.0
+                    && at.y >= 0.0
+                    && at.x < picture.width() as f32
+                    && at.y < picture.height() as f32;
+                if inside {
+                    let seen =
+                        picture.pixels()[at.y as usize * picture.width() as usize + at.x as usize];
+                    all += 1.0;
+                    alike += f64::from(u8::from(same_hue(seen, view.colors[pixel])));
+                }
+            }
+            alike / all
+        };
+        let right = share(calibration.color_from_depth);
+        let wrong = share(effigy_capture::Rigid3::IDENTITY);
+        assert!(right > 0.93, "{}: {right} of the pixels", preset.name());
+        assert!(
+            wrong < right - 0.02,
+            "{}: without the offset {wrong}",
+            preset.name()
+        );
+    }
+}
+
+/// Whether one colour is the other in another light.
+fn same_hue(shaded: [u8; 3], color: [u8; 3]) -> bool {
+    let [a, b] = [shaded, color].map(|c| Vec3::from(c.map(f32::from)).normalize_or_zero());
+    a.dot(b) > 0.997
+}
+
 /// Betas of the tallest of some people.
 fn tallest() -> [f32; 10] {
     let body = builtin::body();

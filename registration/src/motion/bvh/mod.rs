@@ -3,21 +3,18 @@
 //! The reader is bounded: a file may not make it allocate more than the limits below allow, whatever its
 //! header claims.
 
-use std::{fs, path::Path};
+use std::path::Path;
 
 use glam::{Quat, Vec3};
 
-use super::{Motion, RestBody, retarget};
+use super::{Motion, RestBody, file, retarget};
 use crate::error::RegistrationError;
 
 mod parse;
 #[cfg(test)]
 mod tests;
 
-/// The largest file accepted; twenty minutes of a full skeleton at 120 Hz take half of it.
-pub const MAX_BYTES: u64 = 256 << 20;
 pub const MAX_JOINTS: usize = 512;
-pub const MAX_FRAMES: usize = 500_000;
 
 /// A skeleton and what it does, in the file's own units and axes.
 #[derive(Clone, Debug)]
@@ -53,17 +50,7 @@ pub enum Channel {
 
 impl BvhClip {
     pub fn read(path: &Path) -> Result<Self, RegistrationError> {
-        let io = |source| RegistrationError::Io { path: path.to_path_buf(), source };
-        let bytes = fs::metadata(path).map_err(io)?.len();
-        if bytes > MAX_BYTES {
-            return Err(RegistrationError::MotionFile {
-                path: path.to_path_buf(),
-                line: 0,
-                expected: format!("at most {MAX_BYTES} bytes; cut the clip"),
-                found: format!("{bytes} bytes"),
-            });
-        }
-        let text = String::from_utf8_lossy(&fs::read(path).map_err(io)?).into_owned();
+        let text = file::read_text(path)?;
         parse::parse(path, &text)
     }
 
@@ -96,6 +83,35 @@ impl BvhClip {
             positions.push(parent + joint.offset);
         }
         positions
+    }
+}
+
+impl retarget::Clip for BvhClip {
+    fn names(&self) -> Vec<&str> {
+        self.joints
+            .iter()
+            .map(|joint| joint.name.as_str())
+            .collect()
+    }
+
+    fn parents(&self) -> Vec<Option<usize>> {
+        self.joints.iter().map(|joint| joint.parent).collect()
+    }
+
+    fn frame_count(&self) -> usize {
+        self.frames.len()
+    }
+
+    fn frame_secs(&self) -> f32 {
+        self.frame_secs
+    }
+
+    fn rest_positions(&self) -> Vec<Vec3> {
+        Self::rest_positions(self)
+    }
+
+    fn global_pose(&self, frame: usize) -> Vec<(Quat, Vec3)> {
+        Self::global_pose(self, frame)
     }
 }
 

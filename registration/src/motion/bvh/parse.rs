@@ -4,8 +4,8 @@ use std::path::Path;
 
 use glam::{Vec3, vec3};
 
-use super::{BvhClip, BvhJoint, Channel, MAX_FRAMES, MAX_JOINTS};
-use crate::error::RegistrationError;
+use super::{BvhClip, BvhJoint, Channel, MAX_JOINTS};
+use crate::{error::RegistrationError, motion::file::MAX_FRAMES};
 
 pub(super) fn parse(path: &Path, text: &str) -> Result<BvhClip, RegistrationError> {
     let mut lines = Lines { path, rest: text.lines(), number: 0 };

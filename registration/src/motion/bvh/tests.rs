@@ -1,6 +1,9 @@
 //! What the reader claims: real files stand upright with their feet on the floor; broken ones are named.
 
-use std::path::{Path, PathBuf};
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
 
 use glam::Vec3;
 
