@@ -1,6 +1,6 @@
 //! What can go wrong with a scenario or a data set.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use effigy_registration::RegistrationError;
 
@@ -12,6 +12,18 @@ pub enum SimError {
     Json { expected_version: u32, source: serde_json::Error },
     #[error("{path}: {problem}")]
     Dataset { path: PathBuf, problem: String },
+    #[error("{path}: {source}")]
+    CharacterIo { path: PathBuf, source: std::io::Error },
+    /// A glTF file that holds no character we can move.
+    #[error("{path}: expected {expected}, found {found}")]
+    Character { path: PathBuf, expected: String, found: String },
     #[error(transparent)]
     Motion(#[from] RegistrationError),
+}
+
+impl SimError {
+    pub(crate) fn character(path: &Path, expected: &str, found: &str) -> Self {
+        let (expected, found) = (expected.to_owned(), found.to_owned());
+        Self::Character { path: path.to_path_buf(), expected, found }
+    }
 }

@@ -17,6 +17,7 @@ pub mod render;
 pub mod scenario;
 mod scene;
 pub mod sensor;
+pub mod stranger;
 pub mod truth;
 
 pub use error::SimError;
@@ -24,4 +25,5 @@ pub use person::{Outfit, OutfitKind, Person};
 pub use preset::SensorPreset;
 pub use scenario::{MotionChoice, Noise, Room, Scenario};
 pub use sensor::SimulatedSensor;
+pub use stranger::{StrangerChoice, StrangerTruth};
 pub use truth::{ClothTruth, GroundTruth, Truth};

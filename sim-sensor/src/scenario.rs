@@ -2,10 +2,14 @@
 
 use std::path::PathBuf;
 
-use effigy_registration::motion::Routine;
+use effigy_capture::{Calibration, FrameId, Timestamp};
+use effigy_registration::motion::{self, Motion, RestBody, Routine};
 use serde::{Deserialize, Serialize};
 
-use crate::{error::SimError, person::OutfitKind, preset::SensorPreset};
+use crate::{
+    error::SimError, person::OutfitKind, preset::SensorPreset, random::Randomness,
+    stranger::StrangerChoice,
+};
 
 /// Everything a simulation follows from, to the last bit.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -16,6 +20,9 @@ pub struct Scenario {
     pub sensor: SensorPreset,
     pub motion: MotionChoice,
     pub outfit: OutfitKind,
+    /// Somebody else's character instead of a person of ours; outfit, fit and betas have no say then.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub stranger: Option<StrangerChoice>,
     /// Size of simulated clothes, from tight (0) to loose (1); drawn from the seed where none is given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fit: Option<f32>,
@@ -40,6 +47,8 @@ pub enum MotionChoice {
     Routine(Routine),
     /// A BVH file, performed on the spot.
     Bvh(PathBuf),
+    /// Any motion file (`.bvh`, `.amc`, `.npz`, `.csv`), performed on the spot.
+    File(PathBuf),
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -73,6 +82,7 @@ impl Default for Scenario {
             sensor: SensorPreset::Azure,
             motion: MotionChoice::Routine(Routine::Mixture),
             outfit: OutfitKind::Demo,
+            stranger: None,
             fit: None,
             betas: None,
             seconds: 20.0,
@@ -106,6 +116,51 @@ impl Scenario {
     /// Frames from start to end, those that will be dropped included.
     pub fn frame_slots(&self) -> u64 {
         (self.seconds * self.rate_hz()).round().max(1.0) as u64
+    }
+
+    /// The sensor's calibration at this scenario's rate, with a colour camera where colour is asked for.
+    pub fn calibration(&self) -> Calibration {
+        let mut calibration = self.sensor.calibration();
+        calibration.rate_hz = self.rate_hz();
+        if self.color {
+            calibration.color = Some(self.sensor.color_camera());
+            calibration.color_from_depth = self.sensor.color_from_depth();
+        }
+        calibration
+    }
+
+    /// When a frame is exposed; never before the one in front of it.
+    pub fn timestamp(&self, frame: FrameId) -> Timestamp {
+        let frames = frame.0 as f64 + f64::from(self.lateness(frame));
+        Timestamp::from_secs_f64(frames / f64::from(self.rate_hz()))
+    }
+
+    /// In frames, below one.
+    fn lateness(&self, frame: FrameId) -> f32 {
+        const MOST: f32 = 0.9;
+        let random = Randomness::new(self.seed, 1, 0xd0);
+        let late = frame.0 > 0 && random.uniform(2 * frame.0) < self.late_share;
+        if late {
+            MOST * random.uniform(2 * frame.0 + 1)
+        } else {
+            0.0
+        }
+    }
+
+    pub fn is_dropped(&self, frame: FrameId) -> bool {
+        // The first frame always comes: a stream that starts with a gap helps nobody.
+        let random = Randomness::new(self.seed, 0, 0xd0);
+        frame.0 > 0 && random.uniform(frame.0) < self.dropped_share
+    }
+
+    /// The movement as a body performs it.
+    pub(crate) fn motion(&self, rest: &RestBody) -> Result<Motion, SimError> {
+        Ok(match &self.motion {
+            MotionChoice::Routine(routine) => routine.motion(rest, self.rate_hz(), self.seed),
+            MotionChoice::Bvh(path) | MotionChoice::File(path) => motion::open(path, rest)?
+                .in_place()
+                .starting_at_origin(rest),
+        })
     }
 
     /// Refuses what cannot be simulated.

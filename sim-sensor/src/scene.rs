@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
-use effigy_capture::{Calibration, FrameId, Rigid3, Timestamp};
+use effigy_capture::{FrameId, Rigid3};
 use effigy_registration::{
     BodyModel,
     motion::{Motion, MotionPose},
@@ -13,7 +13,7 @@ use crate::{
     error::SimError,
     person::{Outfit, Person, sample_betas},
     random::Randomness,
-    scenario::{MotionChoice, Scenario},
+    scenario::Scenario,
 };
 
 /// What sensor and truth share.
@@ -21,7 +21,6 @@ use crate::{
 pub(crate) struct Scene {
     pub(crate) scenario: Scenario,
     pub(crate) person: Person,
-    pub(crate) calibration: Calibration,
     pub(crate) world_from_camera: Rigid3,
     motion: Motion,
     /// Simulated clothes, shared by all who look at this scene.
@@ -31,56 +30,31 @@ pub(crate) struct Scene {
 impl Scene {
     pub(crate) fn new(scenario: &Scenario, body: Arc<BodyModel>) -> Result<Self, SimError> {
         let scenario = scenario.clone().checked()?;
+        if scenario.stranger.is_some() {
+            return Err(SimError::Scenario {
+                field: "stranger",
+                got: "a character of its own".to_owned(),
+                expected: "none here: a character has no body-model truth; ask StrangerTruth",
+            });
+        }
         let betas = scenario
             .betas
             .unwrap_or_else(|| sample_betas(&body, scenario.seed));
         let outfit = Outfit::new(scenario.outfit, scenario.seed);
         let mut person = Person::new(body, betas, outfit, scenario.seed);
         let cloth = worn(&scenario, &mut person);
-        let mut calibration = scenario.sensor.calibration();
-        calibration.rate_hz = scenario.rate_hz();
-        if scenario.color {
-            calibration.color = Some(scenario.sensor.color_camera());
-            calibration.color_from_depth = scenario.sensor.color_from_depth();
-        }
-        let rest = person.rest_body();
-        let motion = match &scenario.motion {
-            MotionChoice::Routine(routine) => {
-                routine.motion(&rest, scenario.rate_hz(), scenario.seed)
-            }
-            MotionChoice::Bvh(path) => Motion::from_bvh(path, &rest)?
-                .in_place()
-                .starting_at_origin(&rest),
-        };
-        let world_from_camera = calibration.world_from_camera.unwrap_or_default();
-        Ok(Self { scenario, person, calibration, world_from_camera, motion, cloth })
+        let motion = scenario.motion(&person.rest_body())?;
+        let world_from_camera = scenario.calibration().world_from_camera.unwrap_or_default();
+        Ok(Self { scenario, person, world_from_camera, motion, cloth })
     }
 
     pub(crate) fn motion_secs(&self) -> f32 {
         self.motion.duration_secs()
     }
 
-    /// When a frame was exposed; never before the one in front of it.
-    pub(crate) fn timestamp(&self, frame: FrameId) -> Timestamp {
-        let frames = frame.0 as f64 + f64::from(self.lateness(frame));
-        Timestamp::from_secs_f64(frames / f64::from(self.scenario.rate_hz()))
-    }
-
-    /// In frames, below one.
-    fn lateness(&self, frame: FrameId) -> f32 {
-        const MOST: f32 = 0.9;
-        let random = Randomness::new(self.scenario.seed, 1, 0xd0);
-        let late = frame.0 > 0 && random.uniform(2 * frame.0) < self.scenario.late_share;
-        if late {
-            MOST * random.uniform(2 * frame.0 + 1)
-        } else {
-            0.0
-        }
-    }
-
     /// Movements end as they begin, so they repeat for as long as the scenario lasts.
     pub(crate) fn pose(&self, frame: FrameId) -> MotionPose {
-        let secs = self.timestamp(frame).as_secs_f64() as f32;
+        let secs = self.scenario.timestamp(frame).as_secs_f64() as f32;
         let duration_secs = self.motion.duration_secs();
         let secs = if duration_secs > 0.0 {
             secs % duration_secs
@@ -105,12 +79,6 @@ impl Scene {
 
     pub(crate) fn is_in_cloth(&self) -> bool {
         self.cloth.is_some()
-    }
-
-    pub(crate) fn is_dropped(&self, frame: FrameId) -> bool {
-        // The first frame always comes: a stream that starts with a gap helps nobody.
-        let random = Randomness::new(self.scenario.seed, 0, 0xd0);
-        frame.0 > 0 && random.uniform(frame.0) < self.scenario.dropped_share
     }
 }
 

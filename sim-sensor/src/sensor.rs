@@ -11,6 +11,7 @@ use crate::{
     render::{ColorCamera, Renderer, View},
     scenario::{Noise, Scenario},
     scene::Scene,
+    stranger::StrangerScene,
 };
 
 #[cfg(test)]
@@ -18,7 +19,9 @@ mod tests;
 
 /// A depth camera with a moving person in front of it.
 pub struct SimulatedSensor {
-    scene: Scene,
+    scenario: Scenario,
+    calibration: Calibration,
+    actor: Actor,
     renderer: Renderer,
     exposure: noise::Exposure,
     color: Option<ColorCamera>,
@@ -27,29 +30,31 @@ pub struct SimulatedSensor {
 
 impl SimulatedSensor {
     pub fn new(scenario: &Scenario, body: Arc<BodyModel>) -> Result<Self, SimError> {
-        let scene = Scene::new(scenario, body)?;
-        let intrinsics = scene.calibration.depth.intrinsics;
-        let mut renderer = Renderer::new(intrinsics, scene.world_from_camera, scene.scenario.room);
-        if scene.is_in_cloth() {
-            renderer = renderer.two_sided();
-        }
-        let exposure = noise::Exposure::new(&scene.calibration, scene.scenario.sensor.defects());
-        let color = scene.calibration.color.map(|camera| {
-            let depth_from_color = scene.calibration.color_from_depth.inverse();
-            let world_from_color = scene.world_from_camera * depth_from_color;
-            let color = ColorCamera::new(&camera, world_from_color, scene.scenario.room);
-            if scene.is_in_cloth() {
-                color.two_sided()
-            } else {
-                color
-            }
+        let scenario = scenario.clone().checked()?;
+        let actor = if scenario.stranger.is_some() {
+            Actor::Stranger(Box::new(StrangerScene::new(&scenario)?))
+        } else {
+            Actor::Person(Box::new(Scene::new(&scenario, body)?))
+        };
+        let calibration = scenario.calibration();
+        let world_from_camera = calibration.world_from_camera.unwrap_or_default();
+        let room = scenario.room;
+        let mut renderer = Renderer::new(calibration.depth.intrinsics, world_from_camera, room);
+        let mut color = calibration.color.map(|camera| {
+            let depth_from_color = calibration.color_from_depth.inverse();
+            ColorCamera::new(&camera, world_from_camera * depth_from_color, room)
         });
-        Ok(Self { scene, renderer, exposure, color, next: 0 })
+        if actor.is_two_sided() {
+            renderer = renderer.two_sided();
+            color = color.map(ColorCamera::two_sided);
+        }
+        let exposure = noise::Exposure::new(&calibration, scenario.sensor.defects());
+        Ok(Self { scenario, calibration, actor, renderer, exposure, color, next: 0 })
     }
 
     /// What an ideal sensor would see in one frame: true depth, normals, labels, colour.
     pub fn view(&mut self, frame: FrameId) -> &View {
-        draw(&mut self.renderer, &self.scene, Subject::Person(frame))
+        self.actor.draw(&mut self.renderer, Subject::Person(frame))
     }
 
     /// One frame by number, in any order. With simulated clothes a frame far ahead costs the frames between.
@@ -63,22 +68,22 @@ impl SimulatedSensor {
     }
 
     fn expose_subject(&mut self, id: FrameId, subject: Subject) -> Result<Frame, CaptureError> {
-        let view = draw(&mut self.renderer, &self.scene, subject);
-        let raw = match self.scene.scenario.noise {
-            Noise::Sensor => self.exposure.expose(view, self.scene.scenario.seed, id),
+        let view = self.actor.draw(&mut self.renderer, subject);
+        let raw = match self.scenario.noise {
+            Noise::Sensor => self.exposure.expose(view, self.scenario.seed, id),
             Noise::None => self.exposure.truth(view),
         };
         let (width, height) = (view.width as u32, view.height as u32);
         let color = match &mut self.color {
             Some(camera) => {
-                let shaded = draw(camera.renderer(), &self.scene, subject).shaded();
+                let shaded = self.actor.draw(camera.renderer(), subject).shaded();
                 Some(Arc::new(camera.through_lens(&shaded)?))
             }
             None => None,
         };
         Ok(Frame {
             id,
-            timestamp: self.scene.timestamp(id),
+            timestamp: self.scenario.timestamp(id),
             depth: Arc::new(DepthImage::new(width, height, raw)?),
             color,
         })
@@ -86,11 +91,11 @@ impl SimulatedSensor {
 
     /// How long the movement takes before it repeats.
     pub fn motion_secs(&self) -> f32 {
-        self.scene.motion_secs()
+        self.actor.motion_secs()
     }
 
     pub fn scenario(&self) -> &Scenario {
-        &self.scene.scenario
+        &self.scenario
     }
 }
 
@@ -101,10 +106,43 @@ enum Subject {
     Nobody,
 }
 
-fn draw<'a>(renderer: &'a mut Renderer, scene: &Scene, subject: Subject) -> &'a View {
-    let Subject::Person(frame) = subject else {
-        return renderer.render_room();
-    };
+/// Who acts in front of the sensor.
+enum Actor {
+    Person(Box<Scene>),
+    Stranger(Box<StrangerScene>),
+}
+
+impl Actor {
+    /// Whether the surface is seen from both sides: cloth, hair and collars are sheets.
+    fn is_two_sided(&self) -> bool {
+        match self {
+            Self::Person(scene) => scene.is_in_cloth(),
+            Self::Stranger(_) => true,
+        }
+    }
+
+    fn motion_secs(&self) -> f32 {
+        match self {
+            Self::Person(scene) => scene.motion_secs(),
+            Self::Stranger(scene) => scene.motion_secs(),
+        }
+    }
+
+    fn draw<'a>(&self, renderer: &'a mut Renderer, subject: Subject) -> &'a View {
+        let Subject::Person(frame) = subject else {
+            return renderer.render_room();
+        };
+        match self {
+            Self::Person(scene) => draw_person(renderer, scene, frame),
+            Self::Stranger(scene) => {
+                let mesh = scene.surface(frame);
+                renderer.render(&mesh, &scene.paint, &scene.character.weights)
+            }
+        }
+    }
+}
+
+fn draw_person<'a>(renderer: &'a mut Renderer, scene: &Scene, frame: FrameId) -> &'a View {
     let person = &scene.person;
     if let Some(surface) = scene.in_cloth(frame) {
         return renderer.render(&surface.posed, &person.paint, &surface.weights);
@@ -116,16 +154,16 @@ fn draw<'a>(renderer: &'a mut Renderer, scene: &Scene, subject: Subject) -> &'a 
 
 impl FrameSource for SimulatedSensor {
     fn name(&self) -> String {
-        format!("simulated {}", self.scene.scenario.sensor.name())
+        format!("simulated {}", self.scenario.sensor.name())
     }
 
     fn calibration(&self) -> &Calibration {
-        &self.scene.calibration
+        &self.calibration
     }
 
     fn next_frame(&mut self) -> Result<Option<Frame>, CaptureError> {
-        let slots = self.scene.scenario.frame_slots();
-        while self.next < slots && self.scene.is_dropped(FrameId(self.next)) {
+        let slots = self.scenario.frame_slots();
+        while self.next < slots && self.scenario.is_dropped(FrameId(self.next)) {
             self.next += 1;
         }
         if self.next >= slots {
@@ -137,10 +175,10 @@ impl FrameSource for SimulatedSensor {
     }
 
     fn frame_count(&self) -> Option<u64> {
-        let slots = self.scene.scenario.frame_slots();
+        let slots = self.scenario.frame_slots();
         Some(
             (0..slots)
-                .filter(|&f| !self.scene.is_dropped(FrameId(f)))
+                .filter(|&f| !self.scenario.is_dropped(FrameId(f)))
                 .count() as u64,
         )
     }

@@ -89,7 +89,7 @@ impl Truth {
         };
         GroundTruth {
             id: frame,
-            timestamp: self.scene.timestamp(frame),
+            timestamp: self.scene.scenario.timestamp(frame),
             params,
             world_from_camera: self.scene.world_from_camera,
             minimal: person.body.pose(&params),

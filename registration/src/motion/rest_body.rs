@@ -24,6 +24,15 @@ impl RestBody {
 
     /// A body with a surface of its own (shoes, say) on the model's topology, in the zero pose.
     pub fn with_surface(body: &BodyModel, joints: &[Vec3; JOINT_COUNT], vertices: &[Vec3]) -> Self {
+        Self::skinned(joints, vertices, &body.skinning)
+    }
+
+    /// Any surface in the zero pose that SMPL's bones move.
+    pub fn skinned(
+        joints: &[Vec3; JOINT_COUNT],
+        vertices: &[Vec3],
+        skinning: &[VertexWeights],
+    ) -> Self {
         let on_foot = |weights: &VertexWeights| {
             let share = |(bone, weight): (&u8, &f32)| {
                 if FOOT_JOINTS.contains(bone) {
@@ -43,7 +52,7 @@ impl RestBody {
         let (soles, others): (Vec<_>, Vec<_>) = vertices
             .iter()
             .copied()
-            .zip(body.skinning.iter().copied())
+            .zip(skinning.iter().copied())
             .partition(|(_, weights)| on_foot(weights));
         // Enough to notice a hand or a knee on the floor.
         let others = others.into_iter().step_by(16).collect();

@@ -1,5 +1,6 @@
 //! What the person looks like to a colour camera and to infrared light.
 
+use effigy_registration::smpl::VertexWeights;
 use glam::{Vec3, Vec4, vec4};
 
 use super::tailor::Tailoring;
@@ -60,6 +61,14 @@ impl Paint {
             covers: covers
                 .map(|cut| vec4(cut.trousers, cut.shirt, cut.shoe, cut.hair))
                 .collect(),
+            ..Self::materials(random)
+        }
+    }
+
+    /// Skin, hair and clothes of somebody, on no vertex yet.
+    fn materials(random: Randomness) -> Self {
+        Self {
+            covers: Vec::new(),
             skin: pick(&SKINS, random, 0),
             layers: [
                 pick(&TROUSERS, random, 2),
@@ -69,6 +78,25 @@ impl Paint {
             ],
             garments: Vec::new(),
         }
+    }
+
+    /// Somebody else's character, of whose pictures nothing is left: trousers on legs, a shirt on trunk and arms,
+    /// shoes, and hair on the upper part of the head.
+    pub(crate) fn of_bones(weights: &[VertexWeights], hair: &[bool], seed: u64) -> Self {
+        let random = Randomness::new(seed, 0, 0xc0);
+        let cover = |(weights, hair): (&VertexWeights, &bool)| {
+            let share = |bones: &[u8]| -> f32 {
+                let of = weights.bones.iter().zip(&weights.weights);
+                of.filter(|(bone, _)| bones.contains(bone))
+                    .map(|(_, weight)| weight)
+                    .sum()
+            };
+            let skin = share(&[12, 15, 20, 21, 22, 23]);
+            let (trousers, shoe) = (share(&[1, 2, 4, 5]), share(&[7, 8, 10, 11]));
+            let shirt = 1.0 - skin - trousers - shoe;
+            vec4(trousers, shirt, shoe, f32::from(u8::from(*hair)))
+        };
+        Self { covers: weights.iter().zip(hair).map(cover).collect(), ..Self::materials(random) }
     }
 
     /// For a mesh in which these garments, each with so many vertices, follow the body.

@@ -190,7 +190,7 @@ fn the_whole_body_is_in_view_and_on_the_floor() {
             let outfit = OutfitKind::Loose;
             let scenario = Scenario { outfit, betas, ..scenario(preset, routine) };
             let scene = Scene::new(&scenario, builtin::body()).unwrap();
-            let camera = scene.calibration.depth.intrinsics;
+            let camera = scene.scenario.calibration().depth.intrinsics;
             let frames = (scene.motion_secs() * 30.0) as u64;
             for frame in (0..frames).step_by(23) {
                 let pose = scene.pose(FrameId(frame));

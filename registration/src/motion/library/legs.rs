@@ -57,3 +57,49 @@ pub(super) fn squat(at: Moment, style: &Style, rest: &RestBody, stance: &mut Sta
         arm.elbow_rad += 0.12 * size;
     }
 }
+
+/// Some steps backwards, a stop, and the same steps forwards.
+pub(super) fn walk(at: Moment, style: &Style, stance: &mut Stance) {
+    const STEP_M: f32 = 0.26;
+    let x = at.share();
+    let [back, forth] = [
+        stepping((x / 0.48).min(1.0)),
+        stepping(((x - 0.52) / 0.48).max(0.0)),
+    ];
+    for side in 0..2 {
+        let foot = &mut stance.feet[side];
+        foot.ball_m.y -= STEP_M * style.amplitude * (back.placed[side] - forth.placed[side]);
+        let swing = back.swing[side].max(forth.swing[side]);
+        foot.lift_m += 0.07 * swing;
+        foot.pitch_rad += 0.32 * swing * if x < 0.5 { 0.6 } else { 1.0 };
+    }
+    let middle = |steps: &Steps| 0.5 * (steps.placed[0] + steps.placed[1]);
+    stance.pelvis_shift_m.z -= STEP_M * style.amplitude * (middle(&back) - middle(&forth));
+    let sway = |steps: &Steps| steps.swing[1] - steps.swing[0];
+    let swaying = sway(&back) + sway(&forth);
+    stance.pelvis_shift_m += Vec3::new(0.028 * swaying, -0.012, 0.0);
+    stance.spine.y += 0.08 * (sway(&forth) - sway(&back));
+    for (arm, sign) in stance.arms.iter_mut().zip([1.0f32, -1.0]) {
+        arm.flexion_rad += 0.24 * sign * (sway(&forth) - sway(&back)) * style.amplitude;
+        arm.elbow_rad += 0.08;
+    }
+}
+
+/// Feet in turn: how many steps each has taken, and how high it is in its swing.
+struct Steps {
+    placed: [f32; 2],
+    swing: [f32; 2],
+}
+
+/// One step with the left, two with the right, one with the left: both end beside each other.
+fn stepping(x: f32) -> Steps {
+    const STEPS: [(usize, f32); 4] = [(0, 1.0), (1, 2.0), (0, 2.0), (1, 1.0)];
+    let mut steps = Steps { placed: [0.0; 2], swing: [0.0; 2] };
+    for (number, (side, length)) in STEPS.into_iter().enumerate() {
+        let share = (x * STEPS.len() as f32 - number as f32).clamp(0.0, 1.0);
+        steps.placed[side] += length * smooth(share);
+        let arc = (std::f32::consts::PI * share).sin();
+        steps.swing[side] = steps.swing[side].max(arc * arc);
+    }
+    steps
+}

@@ -12,7 +12,10 @@ use super::{
 mod arms;
 mod ease;
 mod legs;
+mod seat;
+mod strikes;
 mod style;
+mod trunk;
 mod turn;
 
 use style::Style;
@@ -33,9 +36,29 @@ pub enum Routine {
     Wave,
     /// Breathes and sways.
     Stand,
+    /// Twists the trunk to both sides, then tilts it.
+    Twist,
+    Punch,
+    ShoulderMill,
+    /// Circles the hips.
+    Hips,
+    /// With the right foot, then with the left.
+    SoccerKick,
+    BallerinaSpin,
+    /// Three steps back, three forwards.
+    Walk,
+    /// Up with one hand, down with the other.
+    Reach,
+    /// On a chair that is not there, and up again.
+    SitDown,
+    /// Down in front, and back over the heels.
+    Bend,
+    ChickenWings,
+    FlyingEagle,
 }
 
 impl Routine {
+    /// The everyday ones: what sensors and trackers are tried with.
     pub const ALL: [Self; 7] = [
         Self::Mixture,
         Self::TurnAround,
@@ -44,6 +67,22 @@ impl Routine {
         Self::Squat,
         Self::Wave,
         Self::Stand,
+    ];
+
+    /// What people do in CAPE, beside the above.
+    pub const ACTIONS: [Self; 12] = [
+        Self::Twist,
+        Self::Punch,
+        Self::ShoulderMill,
+        Self::Hips,
+        Self::SoccerKick,
+        Self::BallerinaSpin,
+        Self::Walk,
+        Self::Reach,
+        Self::SitDown,
+        Self::Bend,
+        Self::ChickenWings,
+        Self::FlyingEagle,
     ];
 
     pub fn name(self) -> &'static str {
@@ -55,6 +94,18 @@ impl Routine {
             Self::Squat => "squat",
             Self::Wave => "wave",
             Self::Stand => "stand",
+            Self::Twist => "twist",
+            Self::Punch => "punch",
+            Self::ShoulderMill => "shoulder_mill",
+            Self::Hips => "hips",
+            Self::SoccerKick => "soccer_kick",
+            Self::BallerinaSpin => "ballerina_spin",
+            Self::Walk => "walk",
+            Self::Reach => "reach",
+            Self::SitDown => "sit_down",
+            Self::Bend => "bend",
+            Self::ChickenWings => "chicken_wings",
+            Self::FlyingEagle => "flying_eagle",
         }
     }
 
@@ -92,6 +143,18 @@ impl Routine {
             Self::Squat => vec![of(Movement::Squat, 2.8), of(Movement::Squat, 2.6)],
             Self::Wave => vec![of(Movement::Wave, 3.5)],
             Self::Stand => vec![of(Movement::Stand, 4.0)],
+            Self::Twist => vec![of(Movement::Twist, 8.0)],
+            Self::Punch => vec![of(Movement::Punch, 5.6)],
+            Self::ShoulderMill => vec![of(Movement::ShoulderMill, 10.0)],
+            Self::Hips => vec![of(Movement::Hips, 6.5)],
+            Self::SoccerKick => vec![of(Movement::SoccerKick, 5.2)],
+            Self::BallerinaSpin => vec![of(Movement::BallerinaSpin, 5.0)],
+            Self::Walk => vec![of(Movement::WalkAbout, 6.0)],
+            Self::Reach => vec![of(Movement::Reach, 5.6)],
+            Self::SitDown => vec![of(Movement::SitDown, 5.0)],
+            Self::Bend => vec![of(Movement::Bend, 6.4)],
+            Self::ChickenWings => vec![of(Movement::ChickenWings, 5.0)],
+            Self::FlyingEagle => vec![of(Movement::FlyingEagle, 6.0)],
         }
     }
 }
@@ -105,6 +168,18 @@ enum Movement {
     RaiseArmsForward,
     Squat,
     Wave,
+    Twist,
+    Punch,
+    ShoulderMill,
+    Hips,
+    SoccerKick,
+    BallerinaSpin,
+    WalkAbout,
+    Reach,
+    SitDown,
+    Bend,
+    ChickenWings,
+    FlyingEagle,
 }
 
 #[derive(Clone, Copy)]
@@ -153,6 +228,18 @@ fn apply(movement: Movement, at: Moment, style: &Style, rest: &RestBody, stance:
         Movement::RaiseArmsForward => arms::raise_forwards(at, style, stance),
         Movement::Squat => legs::squat(at, style, rest, stance),
         Movement::Wave => arms::wave(at, style, stance),
+        Movement::Twist => trunk::twist(at, style, stance),
+        Movement::Punch => strikes::punch(at, style, stance),
+        Movement::ShoulderMill => arms::shoulder_mill(at, style, stance),
+        Movement::Hips => trunk::hips(at, style, rest, stance),
+        Movement::SoccerKick => strikes::soccer_kick(at, style, rest, stance),
+        Movement::BallerinaSpin => turn::ballerina_spin(at, style, rest, stance),
+        Movement::WalkAbout => legs::walk(at, style, stance),
+        Movement::Reach => strikes::reach(at, style, rest, stance),
+        Movement::SitDown => seat::sit_down(at, style, rest, stance),
+        Movement::Bend => trunk::bend(at, style, rest, stance),
+        Movement::ChickenWings => arms::chicken_wings(at, style, stance),
+        Movement::FlyingEagle => arms::flying_eagle(at, style, stance),
     }
 }
 

@@ -7,6 +7,10 @@ use crate::smpl::{BoneTransforms, builtin};
 
 const RATE_HZ: f32 = 30.0;
 
+fn every() -> impl Iterator<Item = Routine> {
+    Routine::ALL.into_iter().chain(Routine::ACTIONS)
+}
+
 fn rest() -> RestBody {
     RestBody::of(&builtin::body(), &[0.0; 10])
 }
@@ -19,7 +23,7 @@ fn facing_rad(pose: &MotionPose) -> f32 {
 #[test]
 fn every_routine_starts_and_ends_facing_the_camera_with_feet_on_the_floor() {
     let rest = rest();
-    for routine in Routine::ALL {
+    for routine in every() {
         let motion = routine.motion(&rest, RATE_HZ, 3);
         for pose in [&motion.poses[0], &motion.poses[motion.poses.len() - 1]] {
             assert!(facing_rad(pose).abs() < 0.05, "{} faces +z", motion.name);
@@ -38,7 +42,7 @@ fn every_routine_starts_and_ends_facing_the_camera_with_feet_on_the_floor() {
 #[test]
 fn movements_are_smooth_and_within_the_limits_of_joints() {
     let rest = rest();
-    for routine in Routine::ALL {
+    for routine in every() {
         for seed in 0..4 {
             let motion = routine.motion(&rest, RATE_HZ, seed);
             for (before, after) in motion.poses.iter().zip(&motion.poses[1..]) {
@@ -121,7 +125,7 @@ fn a_turn_is_one_whole_turn() {
 fn feet_that_stand_do_not_slide() {
     let rest = rest();
     let ball_height_m = rest.joints[10].y - rest.sole_height_m();
-    for routine in Routine::ALL {
+    for routine in every() {
         let motion = routine.motion(&rest, RATE_HZ, 2);
         let balls: Vec<_> = motion
             .poses

@@ -1,5 +1,7 @@
 //! Turning around on the spot, step by step.
 
+use glam::{Vec2, Vec3, vec2};
+
 use super::{
     Foot, Moment, RestBody, Stance,
     ease::{cruise, smooth, window},
@@ -65,4 +67,46 @@ fn landing_heading_rad(step: f32, side: usize) -> f32 {
     }
     let middle_of_stand = step + 0.5 * side as f32 + 0.5 * (1.0 + SWING_SHARE);
     heading_rad(middle_of_stand / STEPS_PER_FOOT as f32)
+}
+
+/// Once around on the ball of the left foot, the right foot at the other knee, arms in a circle.
+pub(super) fn ballerina_spin(at: Moment, style: &Style, rest: &RestBody, stance: &mut Stance) {
+    let x = at.share();
+    let poised = window(x, 0.04, 0.98, 0.22);
+    let lifted = window(x, 0.10, 0.92, 0.16);
+    let heading_rad = std::f32::consts::TAU * cruise((x - 0.26) / 0.46, 0.3);
+    stance.heading_rad = heading_rad;
+    let (sin, cos) = heading_rad.sin_cos();
+    let turned = |p: Vec2| vec2(cos * p.x + sin * p.y, cos * p.y - sin * p.x);
+    let leg_m = rest.joints[1].y - rest.joints[7].y;
+    let toe_out_rad = stance.feet[0].yaw_rad;
+    let standing = stance.feet[0].ball_m;
+    // The pelvis stays over the standing ball; in the heading's frame that turns the other way.
+    let over = vec2(
+        cos * standing.x - sin * standing.y,
+        cos * standing.y + sin * standing.x,
+    );
+    stance.pelvis_shift_m += Vec3::new(over.x, 0.0, over.y) * poised * 0.92;
+    stance.pelvis_shift_m.y += 0.035 * lifted;
+    stance.feet[0].yaw_rad = heading_rad + toe_out_rad;
+    stance.feet[0].pitch_rad += 0.38 * lifted;
+    let foot = &mut stance.feet[1];
+    let beside = foot.ball_m - standing;
+    let at_knee = vec2(-0.05, 0.09);
+    foot.ball_m = standing + turned(beside.lerp(at_knee, lifted));
+    foot.lift_m += 0.42 * leg_m * lifted;
+    foot.yaw_rad = heading_rad - toe_out_rad - 0.55 * lifted;
+    foot.pitch_rad += 0.85 * lifted;
+    stance.spine.x -= 0.05 * poised;
+    // The head stays behind for a moment, then hurries ahead.
+    stance.head.y += 0.30 * lifted * (std::f32::consts::PI - heading_rad).sin();
+    for (arm, sign) in stance.arms.iter_mut().zip([1.0f32, -1.0]) {
+        let circle = super::Arm {
+            abduction_rad: 0.62 + 0.03 * sign * style.asymmetry,
+            flexion_rad: 1.15 * style.amplitude.min(1.0),
+            twist_rad: 0.30,
+            elbow_rad: 0.95,
+        };
+        *arm = super::arms::blend_arm(*arm, circle, poised);
+    }
 }

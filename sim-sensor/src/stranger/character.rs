@@ -1,0 +1,466 @@
+//! A skinned glTF character, made to stand where people of ours stand: metres, y up, facing +z, joints under SMPL's
+//! names.
+
+use std::{collections::BTreeMap, path::Path};
+
+use effigy_fusion::mesh::TriangleMesh;
+use effigy_registration::{
+    motion::{JointMap, RestBody, limb_alignments},
+    smpl::{BoneTransforms, JOINT_COUNT, JOINT_NAMES, PARENTS, VertexWeights, builtin},
+};
+use glam::{Affine3A, Mat4, Quat, Vec3};
+use gltf_json::{
+    mesh::{Mode, Semantic},
+    validation::Checked,
+};
+
+use super::{
+    LIMB_JOINTS,
+    document::Document,
+    skeleton::{Clip, Skeleton},
+};
+use crate::error::SimError;
+
+/// More than any character has.
+const MAX_VERTICES: usize = 1 << 20;
+/// A file in metres holds people of these heights; another unit is scaled to an ordinary one.
+const HUMAN_M: [f32; 2] = [1.2, 2.3];
+const ORDINARY_M: f32 = 1.7;
+
+/// Somebody else's character.
+#[derive(Clone, Debug)]
+pub struct Character {
+    pub name: String,
+    /// Triangles of all its parts; vertices that coincide are one.
+    pub triangles: Vec<[u32; 3]>,
+    /// Skinning weights on SMPL's bones: those of the file, each at the nearest bone that has a part to play.
+    pub weights: Vec<VertexWeights>,
+    /// The surface in SMPL's zero pose.
+    pub zero_pose: Vec<Vec3>,
+    /// Joints in the zero pose.
+    pub joints: [Vec3; JOINT_COUNT],
+    pub(super) clips: Vec<Clip>,
+    skeleton: Skeleton,
+    skin: Skin,
+    roles: JointMap,
+    ours_from_file: Affine3A,
+    /// From the zero pose's bones to those at rest in the file.
+    alignments: [Quat; JOINT_COUNT],
+    rest_globals: Vec<Affine3A>,
+}
+
+/// Vertices as the file binds them.
+#[derive(Clone, Debug, Default)]
+struct Skin {
+    vertices: Vec<Vec3>,
+    /// Numbers of bones in `bones`, and their shares.
+    shares: Vec<[(u16, f32); 4]>,
+    /// Node and inverse bind matrix.
+    bones: Vec<(usize, Mat4)>,
+}
+
+impl Character {
+    /// Reads a `.glb` or `.gltf` file; `height_m` scales it, otherwise files that are not in metres are guessed.
+    pub fn read(path: &Path, height_m: Option<f32>) -> Result<Self, SimError> {
+        let document = Document::read(path)?;
+        let skeleton = Skeleton::of(&document)?;
+        let (skin, triangles) = skin(&document)?;
+        let roles = roles(&document, &skeleton)?;
+        let clips = Clip::all(&document)?;
+        let rest_globals = skeleton.globals(&skeleton.rest);
+        let at_rest = skin.posed(&rest_globals);
+        let ours_from_file = ours_from_file(&document, &at_rest, &rest_globals, &roles, height_m)?;
+        let mut character = Self {
+            name: path
+                .file_stem()
+                .map_or_else(String::new, |s| s.to_string_lossy().into_owned()),
+            triangles,
+            weights: weights(&skin, &skeleton, &roles),
+            zero_pose: Vec::new(),
+            joints: [Vec3::ZERO; JOINT_COUNT],
+            clips,
+            skeleton,
+            skin,
+            roles,
+            ours_from_file,
+            alignments: [Quat::IDENTITY; JOINT_COUNT],
+            rest_globals,
+        };
+        character.straighten(&at_rest);
+        Ok(character)
+    }
+
+    /// What a motion needs to know to put these feet on the floor.
+    pub fn rest_body(&self) -> RestBody {
+        RestBody::skinned(&self.joints, &self.zero_pose, &self.weights)
+    }
+
+    /// The surface in a pose of SMPL's, in the space of `trans`.
+    pub fn posed(&self, theta: &[Vec3; JOINT_COUNT], trans: Vec3) -> TriangleMesh {
+        let (bones, _) = BoneTransforms::from_pose(theta, &self.joints);
+        let mut vertices = vec![Vec3::ZERO; self.zero_pose.len()];
+        bones.skin_into(&self.weights, &self.zero_pose, trans, &mut vertices);
+        self.mesh(vertices)
+    }
+
+    /// Which vertices are hair, for all we know: the head above its brow.
+    pub(super) fn hair(&self) -> Vec<bool> {
+        const BROW: f32 = 0.62;
+        let of_head = |weights: &VertexWeights| {
+            let shares = weights.bones.iter().zip(&weights.weights);
+            shares
+                .filter(|(bone, _)| **bone == 15)
+                .map(|(_, share)| share)
+                .sum::<f32>()
+                > 0.5
+        };
+        let neck_m = self.joints[15].y;
+        let head = self
+            .zero_pose
+            .iter()
+            .zip(&self.weights)
+            .filter(|(_, weights)| of_head(weights));
+        let top_m = head.map(|(vertex, _)| vertex.y).fold(neck_m, f32::max);
+        let brow_m = neck_m + BROW * (top_m - neck_m);
+        let is_hair =
+            |(vertex, weights): (&Vec3, &VertexWeights)| of_head(weights) && vertex.y > brow_m;
+        self.zero_pose
+            .iter()
+            .zip(&self.weights)
+            .map(is_hair)
+            .collect()
+    }
+
+    /// The surface at a time of one of its own clips, in our space, and its nodes.
+    pub(super) fn at(&self, clip: &Clip, secs: f32) -> (TriangleMesh, Vec<Affine3A>) {
+        let globals = self.skeleton.globals(&self.skeleton.at(clip, secs));
+        let vertices = self.skin.posed(&globals);
+        let to_ours = |v: Vec3| self.ours_from_file.transform_point3(v);
+        (
+            self.mesh(vertices.into_iter().map(to_ours).collect()),
+            globals,
+        )
+    }
+
+    /// Where the joint that plays an SMPL joint's part is, and how it is turned from the zero pose.
+    pub(super) fn joint(&self, smpl: usize, globals: &[Affine3A]) -> Option<(Vec3, Quat)> {
+        let node = self.roles.0[smpl]?;
+        let position = self
+            .ours_from_file
+            .transform_point3a(globals[node].translation);
+        let rotation = |global: &Affine3A| global.to_scale_rotation_translation().1;
+        let turn = rotation(&(self.ours_from_file * globals[node]))
+            * rotation(&(self.ours_from_file * self.rest_globals[node])).inverse();
+        Some((position.into(), (turn * self.alignments[smpl]).normalize()))
+    }
+
+    fn mesh(&self, vertices: Vec<Vec3>) -> TriangleMesh {
+        let mut mesh = TriangleMesh::new(vertices, self.triangles.clone());
+        mesh.compute_normals();
+        mesh
+    }
+
+    /// From the file's rest pose to SMPL's zero pose: limbs are turned as ours lie, trunk, head and feet stay.
+    fn straighten(&mut self, at_rest_in_file: &[Vec3]) {
+        let template = builtin::body();
+        let ours = template.joints(&template.template);
+        let to_ours = |v: Vec3| self.ours_from_file.transform_point3(v);
+        let theirs = self
+            .roles
+            .0
+            .map(|node| node.map(|node| to_ours(Vec3::from(self.rest_globals[node].translation))));
+        let alignments = limb_alignments(&theirs, &ours);
+        let leg = |joints: &[Vec3; JOINT_COUNT]| joints[1].y - joints[7].y;
+        let mut rest = [Vec3::ZERO; JOINT_COUNT];
+        for joint in 0..JOINT_COUNT {
+            let known = theirs[1]
+                .zip(theirs[7])
+                .map_or(1.0, |(hip, ankle)| (hip.y - ankle.y) / leg(&ours));
+            let guessed = rest[PARENTS[joint]] + (ours[joint] - ours[PARENTS[joint]]) * known;
+            rest[joint] = theirs[joint].unwrap_or(guessed);
+        }
+        let mut joints = rest;
+        let mut bones = [Affine3A::IDENTITY; JOINT_COUNT];
+        for joint in 0..JOINT_COUNT {
+            let parent = PARENTS[joint];
+            if joint > 0 {
+                joints[joint] = bones[parent].transform_point3(rest[joint]);
+            }
+            let turn = alignments[joint].inverse();
+            bones[joint] =
+                Affine3A::from_rotation_translation(turn, joints[joint] - turn * rest[joint]);
+        }
+        let bones = BoneTransforms(bones);
+        let at_rest: Vec<Vec3> = at_rest_in_file.iter().map(|&v| to_ours(v)).collect();
+        let mut zero_pose = vec![Vec3::ZERO; at_rest.len()];
+        bones.skin_into(&self.weights, &at_rest, Vec3::ZERO, &mut zero_pose);
+        self.zero_pose = zero_pose;
+        self.joints = joints;
+        self.alignments = alignments;
+    }
+}
+
+impl Skin {
+    fn posed(&self, globals: &[Affine3A]) -> Vec<Vec3> {
+        let bones: Vec<Affine3A> = self
+            .bones
+            .iter()
+            .map(|&(node, inverse_bind)| globals[node] * Affine3A::from_mat4(inverse_bind))
+            .collect();
+        let posed = |(vertex, shares): (&Vec3, &[(u16, f32); 4])| {
+            let moved = |&(bone, share): &(u16, f32)| {
+                bones[bone as usize].transform_point3(*vertex) * share
+            };
+            shares.iter().map(moved).sum()
+        };
+        self.vertices.iter().zip(&self.shares).map(posed).collect()
+    }
+}
+
+/// All skinned meshes of a file as one, vertices that coincide merged.
+fn skin(document: &Document) -> Result<(Skin, Vec<[u32; 3]>), SimError> {
+    let mut skin = Skin::default();
+    let mut triangles = Vec::new();
+    let mut known: BTreeMap<[u32; 3], u32> = BTreeMap::new();
+    for node in &document.root.nodes {
+        let (Some(mesh), Some(number)) = (node.mesh, node.skin) else {
+            continue;
+        };
+        let mesh = document.root.meshes.get(mesh.value());
+        let mesh = mesh.ok_or_else(|| document.wrong("a mesh for each node", "none such"))?;
+        let first_bone = skin.bones.len();
+        read_bones(document, number.value(), &mut skin)?;
+        for primitive in &mesh.primitives {
+            if primitive.mode == Checked::Valid(Mode::Triangles) {
+                let merged =
+                    read_primitive(document, primitive, first_bone, (&mut skin, &mut known))?;
+                add_triangles(document, primitive, &merged, &mut triangles)?;
+            }
+        }
+    }
+    if triangles.is_empty() {
+        let found = format!(
+            "{} meshes and {} skins, none of them on one node",
+            document.root.meshes.len(),
+            document.root.skins.len()
+        );
+        return Err(document.wrong(
+            "a mesh with a skin: a character whose bones move it",
+            &found,
+        ));
+    }
+    Ok((skin, triangles))
+}
+
+fn read_bones(document: &Document, number: usize, skin: &mut Skin) -> Result<(), SimError> {
+    let found = document.root.skins.get(number);
+    let found = found.ok_or_else(|| document.wrong("a skin for each skinned mesh", "none such"))?;
+    let inverse_binds = match found.inverse_bind_matrices {
+        Some(accessor) => document.numbers::<16>(accessor.value())?,
+        None => vec![Mat4::IDENTITY.to_cols_array(); found.joints.len()],
+    };
+    let nodes = document.root.nodes.len();
+    let whole = inverse_binds.len() >= found.joints.len()
+        && found.joints.iter().all(|joint| joint.value() < nodes)
+        && u16::try_from(skin.bones.len() + found.joints.len()).is_ok();
+    if !whole {
+        let counts = format!(
+            "{} joints, {} matrices",
+            found.joints.len(),
+            inverse_binds.len()
+        );
+        return Err(document.wrong("a bind matrix for each joint of the skin", &counts));
+    }
+    for (joint, matrix) in found.joints.iter().zip(&inverse_binds) {
+        skin.bones
+            .push((joint.value(), Mat4::from_cols_array(matrix)));
+    }
+    Ok(())
+}
+
+/// Adds a primitive's vertices; returns the number each of them has now.
+fn read_primitive(
+    document: &Document,
+    primitive: &gltf_json::mesh::Primitive,
+    first_bone: usize,
+    (skin, known): (&mut Skin, &mut BTreeMap<[u32; 3], u32>),
+) -> Result<Vec<u32>, SimError> {
+    let attribute = |semantic: Semantic, what: &str| {
+        let found = primitive.attributes.get(&Checked::Valid(semantic));
+        found.map(gltf_json::Index::value).ok_or_else(|| {
+            document.wrong(&format!("{what} in each part of the skinned mesh"), "none")
+        })
+    };
+    let positions = document.numbers::<3>(attribute(Semantic::Positions, "POSITION")?)?;
+    let joints = document.numbers::<4>(attribute(Semantic::Joints(0), "JOINTS_0")?)?;
+    let weights = document.numbers::<4>(attribute(Semantic::Weights(0), "WEIGHTS_0")?)?;
+    if joints.len() != positions.len() || weights.len() != positions.len() {
+        let found = format!("{}, {}, {}", positions.len(), joints.len(), weights.len());
+        return Err(document.wrong("as many joints and weights as positions", &found));
+    }
+    if skin.vertices.len() + positions.len() > MAX_VERTICES {
+        return Err(document.wrong(&format!("at most {MAX_VERTICES} vertices"), "more"));
+    }
+    let bones = skin.bones.len() - first_bone;
+    let mut merged = Vec::with_capacity(positions.len());
+    for ((position, joints), weights) in positions.iter().zip(&joints).zip(&weights) {
+        if joints
+            .iter()
+            .zip(weights)
+            .any(|(&j, &w)| w > 0.0 && j as usize >= bones)
+        {
+            return Err(document.wrong(&format!("joints below {bones}"), &format!("{joints:?}")));
+        }
+        let key = position.map(|x| (x + 0.0).to_bits());
+        let vertex = *known.entry(key).or_insert_with(|| {
+            let sum: f32 = weights.iter().sum();
+            let share = |k: usize| {
+                let bone = (joints[k] as usize).min(bones.saturating_sub(1)) + first_bone;
+                (
+                    bone as u16,
+                    if sum > 0.0 {
+                        weights[k] / sum
+                    } else {
+                        f32::from(u8::from(k == 0))
+                    },
+                )
+            };
+            skin.vertices.push(Vec3::from(*position));
+            skin.shares.push(std::array::from_fn(share));
+            skin.vertices.len() as u32 - 1
+        });
+        merged.push(vertex);
+    }
+    Ok(merged)
+}
+
+fn add_triangles(
+    document: &Document,
+    primitive: &gltf_json::mesh::Primitive,
+    merged: &[u32],
+    triangles: &mut Vec<[u32; 3]>,
+) -> Result<(), SimError> {
+    let indices: Vec<usize> = match primitive.indices {
+        Some(accessor) => document
+            .numbers::<1>(accessor.value())?
+            .into_iter()
+            .map(|[i]| i as usize)
+            .collect(),
+        None => (0..merged.len()).collect(),
+    };
+    for corners in indices.chunks_exact(3) {
+        let corner = |k: usize| merged.get(corners[k]).copied();
+        let (Some(a), Some(b), Some(c)) = (corner(0), corner(1), corner(2)) else {
+            let found = format!("{corners:?} of {} vertices", merged.len());
+            return Err(document.wrong("triangles between vertices that exist", &found));
+        };
+        if a != b && b != c && c != a {
+            triangles.push([a, b, c]);
+        }
+    }
+    Ok(())
+}
+
+fn roles(document: &Document, skeleton: &Skeleton) -> Result<JointMap, SimError> {
+    let names: Vec<&str> = skeleton.names.iter().map(String::as_str).collect();
+    let missing = |smpl: usize| {
+        let expected = format!(
+            "a bone for SMPL's `{}`, under one of the names {} (on its side)",
+            JOINT_NAMES[smpl],
+            JointMap::known_names(smpl)
+        );
+        let found = names
+            .iter()
+            .take(40)
+            .copied()
+            .collect::<Vec<_>>()
+            .join(", ");
+        document.wrong(&expected, &found)
+    };
+    let roles = JointMap::find(&names, &skeleton.parents).map_err(missing)?;
+    match LIMB_JOINTS
+        .into_iter()
+        .find(|&smpl| roles.0[smpl].is_none())
+    {
+        Some(smpl) => Err(missing(smpl)),
+        None => Ok(roles),
+    }
+}
+
+/// Each bone's share goes to the nearest of its ancestors, itself included, that plays a part.
+fn weights(skin: &Skin, skeleton: &Skeleton, roles: &JointMap) -> Vec<VertexWeights> {
+    let mut part_of_node = vec![None; skeleton.names.len()];
+    for (smpl, node) in roles.0.iter().enumerate() {
+        if let Some(node) = node {
+            // A node that plays several parts of the spine is the highest of them.
+            part_of_node[*node] = Some(smpl);
+        }
+    }
+    let part = |bone: usize| {
+        let mut node = Some(skin.bones[bone].0);
+        while let Some(at) = node {
+            if let Some(smpl) = part_of_node[at] {
+                return smpl;
+            }
+            node = skeleton.parents[at];
+        }
+        0
+    };
+    let parts: Vec<usize> = (0..skin.bones.len()).map(part).collect();
+    skin.shares
+        .iter()
+        .map(|shares| {
+            let mut weights = VertexWeights::default();
+            let mut filled = 0;
+            for &(bone, share) in shares.iter().filter(|(_, share)| *share > 0.0) {
+                let smpl = parts[bone as usize] as u8;
+                let slot = (0..filled)
+                    .find(|&k| weights.bones[k] == smpl)
+                    .unwrap_or(filled);
+                weights.bones[slot] = smpl;
+                weights.weights[slot] += share;
+                filled = filled.max(slot + 1);
+            }
+            weights
+        })
+        .collect()
+}
+
+/// Metres, upright, facing +z, feet on the floor, pelvis above the origin.
+fn ours_from_file(
+    document: &Document,
+    at_rest: &[Vec3],
+    globals: &[Affine3A],
+    roles: &JointMap,
+    height_m: Option<f32>,
+) -> Result<Affine3A, SimError> {
+    let joint = |smpl: usize| {
+        roles.0[smpl].map_or(Vec3::ZERO, |node| Vec3::from(globals[node].translation))
+    };
+    let left = joint(1) - joint(2) + joint(16) - joint(17);
+    let turn = Quat::from_rotation_y(left.z.atan2(left.x));
+    let lowest = at_rest.iter().map(|v| v.y).fold(f32::MAX, f32::min);
+    let highest = at_rest.iter().map(|v| v.y).fold(f32::MIN, f32::max);
+    let height = highest - lowest;
+    let upright = joint(16).y > joint(1).y && joint(1).y > joint(7).y;
+    if !(height > 1e-3 && height.is_finite() && upright) {
+        let found = format!(
+            "{height} units from lowest to highest, hips at {}",
+            joint(1).y - lowest
+        );
+        return Err(document.wrong("a character that stands upright at rest, y up", &found));
+    }
+    let natural_m = if (HUMAN_M[0]..=HUMAN_M[1]).contains(&height) {
+        height
+    } else {
+        ORDINARY_M
+    };
+    let scale = height_m.unwrap_or(natural_m) / height;
+    let pelvis = joint(0);
+    let origin = Vec3::new(pelvis.x, lowest, pelvis.z);
+    Ok(Affine3A::from_scale_rotation_translation(
+        Vec3::splat(scale),
+        turn,
+        -(turn * origin) * scale,
+    ))
+}
