@@ -58,7 +58,7 @@ impl Case {
         match (&self.scenario.motion, self.purpose) {
             (_, Purpose::Losses(_)) => "losses".to_owned(),
             (MotionChoice::Routine(routine), _) => routine.name().to_owned(),
-            (MotionChoice::Bvh(path), _) => path.display().to_string(),
+            (MotionChoice::Bvh(path) | MotionChoice::File(path), _) => path.display().to_string(),
         }
     }
 }
