@@ -7,6 +7,8 @@ use effigy_registration::motion::Routine;
 use effigy_sim_sensor::{MotionChoice, OutfitKind, SensorPreset, dataset::DatasetPreset};
 use serde::de::{DeserializeOwned, IntoDeserializer as _, value};
 
+use crate::pipeline::settings::MOST_KEYFRAMES;
+
 /// One depth camera in, a live avatar out.
 #[derive(Debug, Parser)]
 #[command(
@@ -86,14 +88,23 @@ pub(crate) struct SceneArgs {
     /// Who the person is, and what the sensor gets wrong
     #[arg(long, default_value_t = 1)]
     pub(crate) seed: u64,
-    /// How long it goes on
-    #[arg(long, default_value_t = 20.0)]
-    pub(crate) seconds: f32,
+    /// How long it goes on: 20 s, and in a window until it is closed
+    #[arg(long)]
+    pub(crate) seconds: Option<f32>,
 }
 
 /// A name as in files, with dashes or underscores.
 fn named<T: DeserializeOwned>(text: &str) -> Result<T, value::Error> {
     T::deserialize(text.replace('-', "_").into_deserializer())
+}
+
+fn keyframe_count(text: &str) -> Result<usize, String> {
+    let count: usize = text.parse().map_err(|error| format!("{error}"))?;
+    if (1..=MOST_KEYFRAMES).contains(&count) {
+        Ok(count)
+    } else {
+        Err(format!("expected 1 to {MOST_KEYFRAMES}"))
+    }
 }
 
 fn motion(text: &str) -> Result<MotionChoice, value::Error> {
@@ -133,9 +144,9 @@ pub(crate) struct ChainArgs {
     /// Where pictures, avatar and report go
     #[arg(long, default_value = "out")]
     pub(crate) out: PathBuf,
-    /// How many keyframes the avatar is made of
-    #[arg(long, default_value_t = 8)]
-    pub(crate) keyframes: usize,
+    /// How many keyframes the avatar is made of (8, or what the settings say)
+    #[arg(long, value_parser = keyframe_count)]
+    pub(crate) keyframes: Option<usize>,
     /// Write each frame's body in depth-camera space as JSON
     #[arg(long, value_name = "FILE")]
     pub(crate) poses: Option<PathBuf>,
@@ -261,6 +272,7 @@ pub(crate) struct TrainArgs {
 #[derive(Debug, Subcommand)]
 pub(crate) enum TrainWhat {
     /// Meta-learn the field and the hypernetwork over simulated people
+    #[command(after_help = "Example: effigy train prior --out prior.safetensors")]
     Prior(TrainPriorArgs),
 }
 

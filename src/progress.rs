@@ -7,10 +7,14 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 /// How often a line is printed where no bar can be drawn, as a share of the whole.
 const LINES: u64 = 10;
 
+/// Of so many calls while something is waited for, one prints a line.
+const WAITS_A_LINE: u64 = 25;
+
 pub(crate) struct Progress {
     bar: ProgressBar,
     /// Print a line each time this many steps are done; no terminal, no bar.
     line_every: Option<u64>,
+    waits: u64,
 }
 
 impl Progress {
@@ -28,7 +32,7 @@ impl Progress {
         }
         bar.set_prefix(what);
         let line_every = (!terminal).then(|| total.map_or(300, |total| (total / LINES).max(1)));
-        Self { bar, line_every }
+        Self { bar, line_every, waits: 0 }
     }
 
     pub(crate) fn advance(&self, done: u64) {
@@ -53,6 +57,15 @@ impl Progress {
     /// What is going on, beside the bar.
     pub(crate) fn say(&self, message: impl Into<String>) {
         self.bar.set_message(message.into());
+    }
+
+    /// All steps are done and something else is waited for.
+    pub(crate) fn waiting(&mut self, message: String) {
+        if self.line_every.is_some() && self.waits.is_multiple_of(WAITS_A_LINE) {
+            eprintln!("{message}");
+        }
+        self.waits += 1;
+        self.say(message);
     }
 
     pub(crate) fn finish(&self) {

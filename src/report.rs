@@ -172,7 +172,12 @@ impl fmt::Display for FrameCounts {
             } else {
                 "stand 1 to 4 m from the sensor, upright, with some room around you"
             };
-            write!(f, "\n            nobody was found: {remedy}")?;
+            let what = if self.partial > 0 {
+                "no whole body was in view"
+            } else {
+                "nobody was found"
+            };
+            write!(f, "\n            {what}: {remedy}")?;
         }
         Ok(())
     }

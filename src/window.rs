@@ -51,11 +51,17 @@ pub(crate) fn show(
                     }
                     thread::sleep(POLL);
                 }
-                pipeline(shared, Controls::new(commands))
+                let worked = pipeline(Arc::clone(&shared), Controls::new(commands));
+                // What went well stays to be looked at; an error is for the terminal.
+                if worked.is_err() || interrupt::requested() {
+                    shared.update(|snapshot| snapshot.closing = true);
+                }
+                worked
             })
             .context("cannot start the pipeline thread")?;
         let shown = run(Arc::clone(&slot), sender, options);
-        if shown.is_err() {
+        let was_there = slot.is_watched();
+        if shown.is_err() && !was_there {
             no_window.store(true, Ordering::Relaxed);
         } else {
             interrupt::request();
@@ -63,6 +69,7 @@ pub(crate) fn show(
         let worked = worker.join().unwrap_or_else(|panic| resume_unwind(panic));
         match shown {
             Ok(()) => worked.map(|()| Shown::Closed),
+            Err(error) if was_there => Err(error.into()),
             Err(error) => Ok(Shown::Impossible(error)),
         }
     })

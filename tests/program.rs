@@ -1,11 +1,13 @@
 //! The program as its users meet it: commands, exit codes, messages, files.
 
 use std::{
+    collections::BTreeMap,
+    ffi::OsString,
     fs::{self, File},
-    io::{self, Write as _},
+    io::{self, BufRead as _, BufReader, Write as _},
     iter,
     path::Path,
-    process::{Command, Output},
+    process::{Command, Output, Stdio},
 };
 
 use image::{ImageBuffer, Luma};
@@ -125,6 +127,17 @@ fn unwritable_outputs_are_refused_before_the_work_begins() {
     fs::write(here.join("file"), b"in the way").unwrap();
     let demo = ["demo", "--headless", "--seconds", "60", "--out", "file/out"];
     assert_fails(&effigy(here, &demo), DATA, &["file/out"]);
+    for option in ["--poses", "--json"] {
+        let demo = [
+            "demo",
+            "--headless",
+            "--seconds",
+            "60",
+            option,
+            "nowhere/x.json",
+        ];
+        assert_fails(&effigy(here, &demo), DATA, &["nowhere/x.json"]);
+    }
     let simulate = ["simulate", "--seconds", "1", "--out", "nowhere/s.mcap"];
     assert_fails(&effigy(here, &simulate), DATA, &["nowhere/s.mcap"]);
 }
@@ -209,55 +222,153 @@ fn an_image_of_another_size_is_an_error_that_names_it() {
 }
 
 #[test]
-fn a_live_run_that_was_recorded_repeats_itself_with_its_avatar() {
+fn what_is_replayed_is_never_recorded_over() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    simulate(here, "s.mcap", "0.2");
+    let before = fs::read(here.join("s.mcap")).unwrap();
+    let replay = ["replay", "s.mcap", "--headless", "--record", "./s.mcap"];
+    assert_fails(&effigy(here, &replay), DATA, &["s.mcap", "overwrite"]);
+    assert!(before == fs::read(here.join("s.mcap")).unwrap());
+}
+
+#[test]
+fn settings_that_mean_nothing_are_refused_with_what_was_expected() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    for (settings, expected) in [
+        ("[fine_tune]\nsteps = 0\n", "at least 1"),
+        ("[keyframes]\ncount = 0\n", "1 to 64"),
+        ("[clean]\nrange_m = [4.0, 0.5]\n", "nearest"),
+        ("[clean]\nrang_m = [0.5, 4.0]\n", "rang_m"),
+    ] {
+        fs::write(here.join("settings.toml"), settings).unwrap();
+        let demo = [
+            "demo",
+            "--headless",
+            "--seconds",
+            "60",
+            "--config",
+            "settings.toml",
+        ];
+        assert_fails(&effigy(here, &demo), DATA, &["settings.toml", expected]);
+    }
+    let none = ["demo", "--headless", "--keyframes", "0"];
+    assert_fails(&effigy(here, &none), USAGE, &["1 to 64"]);
+}
+
+#[cfg(unix)]
+#[test]
+fn ctrl_c_ends_a_run_in_order_even_while_it_waits_for_an_avatar() {
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
     simulate(here, "s.mcap", "4");
-    fs::write(here.join("quick.toml"), "[fine_tune]\nsteps = 4\n").unwrap();
-    let run = |arguments: &[&str], name: &str| {
-        let poses = format!("{name}.json");
-        let common = [
+    fs::write(here.join("long.toml"), "[fine_tune]\nsteps = 1000000\n").unwrap();
+    let mut run = Command::new(env!("CARGO_BIN_EXE_effigy"))
+        .current_dir(here)
+        .args([
+            "replay",
+            "s.mcap",
             "--headless",
-            "--config",
-            "quick.toml",
+            "--out",
+            "out",
             "--keyframes",
             "2",
-            "--out",
-            name,
-            "--poses",
-            &poses,
-            "--meshes",
-            name,
-        ];
-        assert_succeeds(&effigy(here, &[arguments, &common].concat()));
-    };
-    run(
-        &["replay", "s.mcap", "--realtime", "--record", "live.mcap"],
-        "live",
-    );
-    run(&["replay", "live.mcap"], "again");
-    let poses = |name: &str| fs::read(here.join(format!("{name}.json"))).unwrap();
-    assert!(poses("live") == poses("again"), "poses differ");
-    let meshes = |name: &str| -> Vec<_> {
-        let files = fs::read_dir(here.join(name)).unwrap();
-        let mut meshes: Vec<_> = files
-            .map(|file| file.unwrap().path())
-            .filter(|path| path.extension().is_some_and(|extension| extension == "ply"))
-            .map(|path| {
-                (
-                    path.file_name().unwrap().to_owned(),
-                    fs::read(path).unwrap(),
-                )
-            })
-            .collect();
-        meshes.sort();
-        meshes
-    };
+        ])
+        .args(["--config", "long.toml"])
+        .stderr(Stdio::piped())
+        .stdout(Stdio::null())
+        .spawn()
+        .unwrap();
+    // After the last frame it says what it waits for.
+    let mut said = BufReader::new(run.stderr.take().unwrap()).lines();
+    let waits = |line: io::Result<String>| line.unwrap().starts_with("fine-tuning");
+    assert!(said.any(waits), "it waits for the avatar");
+    let id = run.id().to_string();
+    let told = Command::new("kill").args(["-INT", &id]).status().unwrap();
+    assert!(told.success());
+    let last_words: Vec<String> = said.map(Result::unwrap).collect();
+    assert!(run.wait().unwrap().success(), "{last_words:?}");
+    assert_eq!(report(&here.join("out"))["frames"]["in"], 120);
+}
+
+#[test]
+fn a_live_run_that_was_recorded_repeats_itself() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    simulate(here, "s.mcap", "3");
+    let live = ["replay", "s.mcap", "--realtime", "--record", "live.mcap"];
+    run_quickly(here, &live, "live");
+    run_quickly(here, &["replay", "live.mcap"], "again");
+    assert!(poses(here, "live") == poses(here, "again"), "poses differ");
+    // How many there are depends on how fast this machine is; none at all is possible.
     assert!(
-        !meshes("live").is_empty(),
-        "the avatar took over while frames still came"
+        meshes(here, "live") == meshes(here, "again"),
+        "meshes differ"
     );
-    assert!(meshes("live") == meshes("again"), "meshes differ");
+}
+
+#[test]
+fn a_replay_repeats_when_the_avatar_took_over_not_when_it_would_have() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    simulate(here, "s.mcap", "3");
+    // Much sooner than a replay does by itself.
+    fs::write(
+        here.join("soon.toml"),
+        QUICK.to_owned() + "[schedule]\nswap_after_frames = 10\n",
+    )
+    .unwrap();
+    let soon = [
+        "replay",
+        "s.mcap",
+        "--record",
+        "soon.mcap",
+        "--config",
+        "soon.toml",
+    ];
+    run(here, &soon, "soon");
+    run_quickly(here, &["replay", "soon.mcap"], "again");
+    let first = meshes(here, "soon");
+    assert!((1..90).contains(&first.len()), "{} meshes", first.len());
+    assert!(first == meshes(here, "again"), "meshes differ");
+    assert!(poses(here, "soon") == poses(here, "again"), "poses differ");
+}
+
+/// Fine-tuning that takes next to no time.
+const QUICK: &str = "[fine_tune]\nsteps = 4\n";
+
+fn run_quickly(here: &Path, arguments: &[&str], name: &str) {
+    fs::write(here.join("quick.toml"), QUICK).expect("the folder is this test's");
+    run(
+        here,
+        &[arguments, &["--config", "quick.toml"]].concat(),
+        name,
+    );
+}
+
+/// Two keyframes; poses go to `name.json`, all else into the folder `name`.
+fn run(here: &Path, arguments: &[&str], name: &str) {
+    let poses = format!("{name}.json");
+    let common = ["--headless", "--keyframes", "2", "--out", name];
+    let files = ["--poses", &poses, "--meshes", name];
+    assert_succeeds(&effigy(here, &[arguments, &common, &files].concat()));
+}
+
+fn poses(here: &Path, name: &str) -> Vec<u8> {
+    fs::read(here.join(format!("{name}.json"))).expect("the run wrote its poses")
+}
+
+fn meshes(here: &Path, name: &str) -> BTreeMap<OsString, Vec<u8>> {
+    let files = fs::read_dir(here.join(name)).expect("the run made its folder");
+    let paths = files.map(|file| file.expect("it can be listed").path());
+    let meshes = paths.filter(|path| path.extension().is_some_and(|ending| ending == "ply"));
+    meshes
+        .map(|path| {
+            let name = path.file_name().expect("it is a file").to_owned();
+            (name, fs::read(path).expect("it can be read"))
+        })
+        .collect()
 }
 
 #[test]

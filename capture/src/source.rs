@@ -54,6 +54,11 @@ pub fn open(path: &Path) -> Result<Box<dyn FrameSource>, CaptureError> {
     }
 }
 
+/// Whether a file is a recording of ours, or at least begins like one; its name does not matter.
+pub fn is_recording(path: &Path) -> bool {
+    path.is_file() && first_bytes(path).is_ok_and(|start| start == MAGIC)
+}
+
 /// As many as the longest magic has.
 fn first_bytes(path: &Path) -> Result<Vec<u8>, CaptureError> {
     let file = File::open(path).map_err(CaptureError::io(path))?;

@@ -11,6 +11,7 @@ use effigy_viewer::SnapshotSlot;
 use crate::window;
 use crate::{
     cli::ChainArgs,
+    interrupt,
     machine::{Machine, peak_memory_mb},
     pipeline::{
         avatar_stage::AvatarStage,
@@ -48,9 +49,9 @@ pub(crate) enum Pace {
     RealTime,
 }
 
-/// With a window if that is wished and possible, headless otherwise.
+/// With a window if that is wished and possible, headless otherwise; `open` is told which.
 pub(crate) fn run(
-    open: impl Fn() -> anyhow::Result<Input> + Sync,
+    open: impl Fn(bool) -> anyhow::Result<Input> + Sync,
     args: &ChainArgs,
 ) -> anyhow::Result<()> {
     #[cfg(feature = "window")]
@@ -62,7 +63,7 @@ pub(crate) fn run(
         let exit_after_secs = args.exit_after;
         let shown = window::show(picture, exit_after_secs, |slot, controls| {
             // A window shows things as they happen.
-            let input = Input { pace: Pace::RealTime, ..open()? };
+            let input = Input { pace: Pace::RealTime, ..open(true)? };
             run_chain(input, args, Some(slot), &controls)
         })?;
         match shown {
@@ -70,7 +71,7 @@ pub(crate) fn run(
             window::Shown::Impossible(reason) => eprintln!("effigy: {reason}; going on headless"),
         }
     }
-    run_chain(open()?, args, None, &Controls::none())
+    run_chain(open(false)?, args, None, &Controls::none())
 }
 
 fn run_chain(
@@ -82,7 +83,7 @@ fn run_chain(
     let clock = Clock::start();
     let body = body_model(args.body.as_deref())?;
     let mut settings = Settings::load(args.config.as_deref())?;
-    settings.keyframes.count = args.keyframes;
+    settings.keyframes.count = args.keyframes.unwrap_or(settings.keyframes.count);
     if input.pace == Pace::RealTime && settings.fine_tune.threads.count == 0 {
         settings.fine_tune.threads.count = threads_beside_a_live_chain();
     }
@@ -97,6 +98,10 @@ fn run_chain(
             &body,
             clock,
         ));
+    }
+    if input.truth.is_some() && body.identity != builtin::body().identity {
+        eprintln!("effigy: the truth is about the built-in body: nothing is compared with it");
+        input.truth = None;
     }
     if let Some(path) = &args.record {
         let when_slow = match input.pace {
@@ -121,6 +126,9 @@ fn run_chain(
         }
     };
     let mut report = report(name, &log);
+    if interrupt::requested() {
+        eprintln!("effigy: stopping; pictures and figures of what there is follow");
+    }
     outputs.finish(&log, avatar.avatar(), input.truth.as_ref())?;
     evaluate(
         &mut report,

@@ -2,29 +2,30 @@
 
 use std::collections::BTreeMap;
 
-use anyhow::Context as _;
 use effigy_registration::smpl::builtin;
 use effigy_sim_sensor::{SimulatedSensor, Truth};
 
 use super::{
     chain::{self, Input, Pace},
-    scene::scenario,
+    scene::{SECONDS, scenario},
     simulate::SCENARIO_KEY,
 };
 use crate::cli::DemoArgs;
 
+/// Nobody watches longer.
+const UNTIL_CLOSED_SECS: f32 = 3600.0;
+
 pub(crate) fn run(args: &DemoArgs) -> anyhow::Result<()> {
-    let scenario = scenario(&args.scene)?;
-    let text = serde_json::to_string(&scenario).context("a scenario is plain data")?;
-    let metadata = BTreeMap::from([(SCENARIO_KEY.to_owned(), text)]);
-    let open = || {
+    let open = |windowed: bool| {
+        let seconds = if windowed { UNTIL_CLOSED_SECS } else { SECONDS };
+        let scenario = scenario(&args.scene, seconds)?;
         let sensor = SimulatedSensor::new(&scenario, builtin::body())?;
         let truth = Truth::new(&scenario, builtin::body())?;
         Ok(Input {
             source: Box::new(sensor),
             truth: Some(truth),
             pace: Pace::LockStep,
-            metadata: metadata.clone(),
+            metadata: BTreeMap::from([(SCENARIO_KEY.to_owned(), scenario.to_json())]),
             decided: None,
         })
     };

@@ -5,6 +5,7 @@ use std::{fs, path::Path};
 use anyhow::{Context as _, bail};
 use effigy_avatar::checkpoint;
 use effigy_capture::{recording, source};
+use effigy_registration::BodyModel;
 use serde_json::{Value, json};
 
 use crate::cli::InfoArgs;
@@ -26,8 +27,9 @@ fn facts(path: &Path) -> anyhow::Result<Value> {
         .and_then(|ending| ending.to_str())
         .unwrap_or_default();
     match ending {
-        "mcap" => Ok(serde_json::to_value(recording::info(path)?)?),
+        _ if source::is_recording(path) => Ok(serde_json::to_value(recording::info(path)?)?),
         "effigy" => avatar_facts(path),
+        "npz" => body_facts(path),
         _ if path.exists() => source_facts(path),
         _ => bail!("{}: no such file or folder", path.display()),
     }
@@ -36,6 +38,17 @@ fn facts(path: &Path) -> anyhow::Result<Value> {
 fn avatar_facts(path: &Path) -> anyhow::Result<Value> {
     let header = checkpoint::read_header(path)?;
     Ok(serde_json::to_value(header)?)
+}
+
+fn body_facts(path: &Path) -> anyhow::Result<Value> {
+    let body = BodyModel::load(path)?;
+    Ok(json!({
+        "kind": "body model",
+        "vertices": body.vertex_count(),
+        "triangles": body.triangles.len(),
+        "shape_parameters": body.shape_dirs.len(),
+        "identity": body.identity,
+    }))
 }
 
 fn source_facts(path: &Path) -> anyhow::Result<Value> {

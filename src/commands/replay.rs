@@ -1,8 +1,8 @@
 //! `effigy replay`: a recording, a folder or a single frame through the whole chain.
 
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, path::Path};
 
-use anyhow::Context as _;
+use anyhow::{Context as _, ensure};
 use effigy_capture::{
     recording::{Player, Recording},
     source,
@@ -22,7 +22,14 @@ pub(crate) fn run(args: &ReplayArgs) -> anyhow::Result<()> {
     } else {
         Pace::LockStep
     };
-    let open = || {
+    if let Some(record) = &args.chain.record {
+        ensure!(
+            !is_same_file(&args.input, record),
+            "{}: --record would overwrite what is being replayed; choose another file",
+            record.display()
+        );
+    }
+    let open = |_windowed: bool| {
         let input = open(args)?;
         Ok(Input { pace, ..input })
     };
@@ -31,11 +38,7 @@ pub(crate) fn run(args: &ReplayArgs) -> anyhow::Result<()> {
 
 /// The source; of a recording, also the truth if a simulator left its scenario there, and what was decided live.
 fn open(args: &ReplayArgs) -> anyhow::Result<Input> {
-    let is_recording = args
-        .input
-        .extension()
-        .is_some_and(|extension| extension == "mcap");
-    if !is_recording {
+    if !source::is_recording(&args.input) {
         return Ok(Input {
             source: source::open(&args.input)?,
             truth: None,
@@ -45,11 +48,8 @@ fn open(args: &ReplayArgs) -> anyhow::Result<Input> {
         });
     }
     let recording = Recording::open(&args.input)?;
-    if let Some(damage) = recording.damage() {
-        eprintln!("effigy: {}: {damage}", args.input.display());
-    }
     let scenario = recording.metadata(SCENARIO_KEY);
-    let truth = scenario.map(truth_of).transpose()?;
+    let truth = scenario.and_then(truth_of);
     let metadata = scenario.map(|text| (SCENARIO_KEY.to_owned(), text.to_owned()));
     let metadata = metadata.into_iter().collect();
     let decided =
@@ -63,9 +63,16 @@ fn open(args: &ReplayArgs) -> anyhow::Result<Input> {
     })
 }
 
-fn truth_of(scenario: &str) -> anyhow::Result<Truth> {
-    let scenario: Scenario = serde_json::from_str(scenario).context(
-        "the recording's scenario is from another version; its frames play without truth",
-    )?;
-    Ok(Truth::new(&scenario, builtin::body())?)
+/// What the simulator left there, if it can be made again here.
+fn truth_of(scenario: &str) -> Option<Truth> {
+    let truth =
+        Scenario::from_json(scenario).and_then(|scenario| Truth::new(&scenario, builtin::body()));
+    truth
+        .inspect_err(|error| eprintln!("effigy: nothing is compared with the truth: {error}"))
+        .ok()
+}
+
+fn is_same_file(a: &Path, b: &Path) -> bool {
+    let canonical = |path: &Path| path.canonicalize().ok();
+    canonical(a).is_some_and(|a| canonical(b) == Some(a))
 }

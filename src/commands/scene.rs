@@ -4,13 +4,17 @@ use effigy_sim_sensor::Scenario;
 
 use crate::cli::SceneArgs;
 
-pub(crate) fn scenario(args: &SceneArgs) -> anyhow::Result<Scenario> {
+/// How long a simulation lasts that ends by itself.
+pub(crate) const SECONDS: f32 = 20.0;
+
+/// `seconds` is used where nothing was typed.
+pub(crate) fn scenario(args: &SceneArgs, seconds: f32) -> anyhow::Result<Scenario> {
     let scenario = Scenario {
         seed: args.seed,
         sensor: args.sensor,
         motion: args.motion.clone(),
         outfit: args.outfit,
-        seconds: args.seconds,
+        seconds: args.seconds.unwrap_or(seconds),
         ..Scenario::default()
     };
     Ok(scenario.checked()?)

@@ -7,14 +7,14 @@ use effigy_capture::{FrameSource as _, recording::RecordingWriter};
 use effigy_registration::smpl::builtin;
 use effigy_sim_sensor::SimulatedSensor;
 
-use super::scene::scenario;
+use super::scene::{SECONDS, scenario};
 use crate::{cli::SimulateArgs, interrupt, progress::Progress};
 
 /// Where a recording keeps the scenario it was made from: the truth, to be computed again.
 pub(crate) const SCENARIO_KEY: &str = "effigy.scenario";
 
 pub(crate) fn run(args: &SimulateArgs) -> anyhow::Result<()> {
-    let scenario = scenario(&args.scene)?;
+    let scenario = scenario(&args.scene, SECONDS)?;
     let text = serde_json::to_string(&scenario).context("a scenario is plain data")?;
     let metadata = BTreeMap::from([(SCENARIO_KEY.to_owned(), text)]);
     let mut sensor = SimulatedSensor::new(&scenario, builtin::body())?;

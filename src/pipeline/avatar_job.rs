@@ -7,10 +7,11 @@ use std::{
         atomic::{AtomicBool, Ordering},
     },
     thread::{self, JoinHandle},
+    time::Duration,
 };
 
 use anyhow::{Context as _, anyhow, ensure};
-use crossbeam::channel::{Receiver, bounded};
+use crossbeam::channel::{Receiver, RecvTimeoutError, bounded};
 use effigy_avatar::{
     Avatar, CanonicalSamples, Canonicaliser, TopologyConfig,
     fine_tune::{FineTuneProgress, fine_tune},
@@ -22,6 +23,10 @@ use effigy_capture::CameraModel;
 use effigy_registration::BodyModel;
 
 use super::{clock::Clock, settings::Settings};
+use crate::interrupt;
+
+/// How often somebody who waits for an avatar looks up.
+const LOOK_EVERY: Duration = Duration::from_millis(100);
 
 /// A running job; dropping it cancels it.
 pub(crate) struct AvatarJob {
@@ -77,13 +82,21 @@ impl AvatarJob {
         Ok(Self { cancel, progress, result, thread })
     }
 
-    /// Whether [`Self::wait`] would return at once.
+    /// Whether the avatar is there.
     pub(crate) fn is_finished(&self) -> bool {
         !self.result.is_empty() || self.thread.is_finished()
     }
 
-    pub(crate) fn wait(&self) -> anyhow::Result<FinishedAvatar> {
-        self.result.recv().unwrap_or_else(|_| Err(died()))
+    /// The avatar, waited for if need be; `None` if the user wants to stop.
+    pub(crate) fn wait(&self) -> Option<anyhow::Result<FinishedAvatar>> {
+        loop {
+            match self.result.recv_timeout(LOOK_EVERY) {
+                Ok(finished) => return Some(finished),
+                Err(RecvTimeoutError::Disconnected) => return Some(Err(died())),
+                Err(RecvTimeoutError::Timeout) if interrupt::requested() => return None,
+                Err(RecvTimeoutError::Timeout) => {}
+            }
+        }
     }
 
     pub(crate) fn progress(&self) -> FineTuneProgress {

@@ -1,6 +1,6 @@
 //! From tracked bodies to a driven avatar: collects keyframes, has the avatar made and made better, drives it.
 
-use std::{collections::BTreeSet, sync::Arc};
+use std::{collections::BTreeSet, sync::Arc, thread, time::Duration};
 
 use effigy_avatar::{
     Avatar, AvatarMesh, DriveConfig, Driver, KeyframeSelector, fine_tune::FineTuneProgress,
@@ -15,6 +15,9 @@ use super::{
     settings::Settings,
 };
 use crate::interrupt;
+
+/// How often somebody who waits for an avatar looks up.
+const LOOK_EVERY: Duration = Duration::from_millis(200);
 
 pub(crate) struct AvatarStage {
     body: Arc<BodyModel>,
@@ -114,8 +117,16 @@ impl AvatarStage {
         )
     }
 
-    /// Waits for an avatar that is being made, at the end of a source; not if the user wants to stop.
-    pub(crate) fn end(&mut self) -> anyhow::Result<()> {
+    /// Waits for an avatar that is being made, at the end of a source; not if the user wants to stop. `meanwhile`
+    /// is called now and then.
+    pub(crate) fn end(&mut self, mut meanwhile: impl FnMut(&Self)) -> anyhow::Result<()> {
+        while let Some(making) = &self.making
+            && !making.job.is_finished()
+            && !interrupt::requested()
+        {
+            meanwhile(self);
+            thread::sleep(LOOK_EVERY);
+        }
         let decision = if interrupt::requested() {
             Decision::Cancel
         } else {
@@ -253,12 +264,16 @@ impl AvatarStage {
         Ok(())
     }
 
-    /// Waits for the avatar that was begun, if it is not there yet.
+    /// Waits for the avatar that was begun, if it is not there yet, unless the user wants to stop.
     fn take_over(&mut self) -> anyhow::Result<()> {
         let Some(Making { job, keyframes, .. }) = self.making.take() else {
             return Ok(());
         };
-        let FinishedAvatar { avatar, figures } = job.wait()?;
+        let Some(finished) = job.wait() else {
+            self.gave_up = true;
+            return Ok(());
+        };
+        let FinishedAvatar { avatar, figures } = finished?;
         self.learned_from.extend(&keyframes);
         self.figures.push(figures);
         let driver = Driver::new(Arc::new(avatar), DriveConfig::default());

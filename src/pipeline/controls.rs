@@ -54,8 +54,12 @@ impl Controls {
         Self { commands, playing: Arc::default() }
     }
 
-    /// Before each frame: waits while paused, goes where the user wants to.
-    pub(crate) fn steer(&self, source: &mut dyn FrameSource) -> Steered {
+    /// Before each frame: waits while paused (and not `stopped`), goes where the user wants to.
+    pub(crate) fn steer(
+        &self,
+        source: &mut dyn FrameSource,
+        stopped: impl Fn() -> bool,
+    ) -> Steered {
         let mut steered = Steered::default();
         loop {
             let playing = self.take_wishes();
@@ -72,7 +76,7 @@ impl Controls {
             }
             // A seek shows where it led to, even while paused.
             let goes_on = !playing.paused || playing.steps > 0 || playing.seek.is_some();
-            if goes_on || interrupt::requested() {
+            if goes_on || stopped() {
                 return steered;
             }
             thread::sleep(POLL);

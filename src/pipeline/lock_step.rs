@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use effigy_capture::FrameSource;
+use effigy_capture::{FrameId, FrameSource};
 use effigy_registration::BodyModel;
 
 use super::{
@@ -21,11 +21,16 @@ pub(crate) fn run(
 ) -> anyhow::Result<RunLog> {
     let mut tracking = TrackStage::new(source.calibration(), Arc::clone(body), settings, clock);
     let mut log = RunLog::new(clock);
+    let (mut delivered, mut missing) = (0, 0);
+    let mut before: Option<FrameId> = None;
     while !interrupt::requested() {
         let Some(frame) = log.timings.time(&clock, "source", || source.next_frame())? else {
             break;
         };
         log.delivered(&frame);
+        delivered += 1;
+        missing += before.map_or(0, |before| frame.id.0.saturating_sub(before.0 + 1));
+        before = Some(frame.id);
         let tracked = tracking.process(&frame)?;
         let registered = &tracked.registered;
         log.registered(&tracked);
@@ -34,7 +39,8 @@ pub(crate) fn run(
         outputs.record(&frame, &decided)?;
         outputs.frame(&frame, registered, mesh.as_ref(), (avatar, &log))?;
     }
-    avatar.end()?;
+    log.captured(delivered, 0, missing);
+    outputs.wait_for_avatar(avatar)?;
     log.avatar_made(avatar);
     Ok(log)
 }

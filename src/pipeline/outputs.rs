@@ -1,6 +1,10 @@
 //! What a run writes while it runs and when it ends.
 
-use std::{fs, path::PathBuf, sync::Arc};
+use std::{
+    fs::{self, OpenOptions},
+    path::{Path, PathBuf},
+    sync::Arc,
+};
 
 use anyhow::Context as _;
 use effigy_avatar::{
@@ -32,6 +36,9 @@ const MOMENTS: u64 = 8;
 /// Every so many frames, where nobody knows how many there will be.
 const MOMENT_EVERY: u64 = 90;
 
+/// Longer without a tracked body, and the movement ends.
+const LONGEST_GAP_SECS: f64 = 10.0;
+
 pub(crate) struct Outputs {
     out: PathBuf,
     poses: Option<(PathBuf, PoseLog)>,
@@ -44,10 +51,13 @@ pub(crate) struct Outputs {
     progress: Progress,
     publisher: Option<Publisher>,
     recorder: Option<Recorder>,
+    frames: u64,
+    /// The newest frame: the pose an avatar takes that comes after the end.
+    last: Option<Arc<RegisteredFrame>>,
 }
 
 impl Outputs {
-    /// Makes the folders, so that an unwritable place is known at once.
+    /// Makes the folders and tries the files, so that an unwritable place is known at once.
     pub(crate) fn new(
         args: &ChainArgs,
         calibration: &Calibration,
@@ -62,6 +72,9 @@ impl Outputs {
                 )
             })?;
         }
+        for file in args.poses.iter().chain(&args.json) {
+            check_writable(file)?;
+        }
         Ok(Self {
             out: args.out.clone(),
             poses: args.poses.clone().map(|path| (path, PoseLog::default())),
@@ -74,6 +87,8 @@ impl Outputs {
             progress: Progress::new("frames", frame_count),
             publisher: None,
             recorder: None,
+            frames: 0,
+            last: None,
         })
     }
 
@@ -149,7 +164,25 @@ impl Outputs {
             self.moments.push(RegisteredFrame::clone(registered));
         }
         self.progress.say(avatar.status());
-        self.progress.advance(frame.id.0 + 1);
+        self.frames += 1;
+        self.progress.advance(self.frames);
+        self.last = Some(Arc::clone(registered));
+        Ok(())
+    }
+
+    /// Waits for the avatar that is still being made when the source has ended, and shows it.
+    pub(crate) fn wait_for_avatar(&mut self, avatar: &mut AvatarStage) -> anyhow::Result<()> {
+        avatar.end(|avatar| {
+            self.progress.waiting(avatar.status());
+            if let Some(publisher) = &mut self.publisher {
+                publisher.waiting(avatar);
+            }
+        })?;
+        if let (Some(publisher), Some(last)) = (&mut self.publisher, &self.last)
+            && let Some(mesh) = avatar.drive(last)
+        {
+            publisher.avatar(&mesh, avatar);
+        }
         Ok(())
     }
 
@@ -184,14 +217,77 @@ impl Outputs {
 
     /// What the person did, as the avatar shall do it in other programs.
     fn tracked_motion(&self, log: &RunLog) -> Motion {
-        let pose = |sample: &TrackedSample| MotionPose {
-            theta: sample.params.theta,
-            trans: sample.params.trans,
-        };
-        Motion {
-            name: "tracked".to_owned(),
-            rate_hz: self.calibration.rate_hz,
-            poses: log.tracked.iter().map(pose).collect(),
+        let rate_hz = self.calibration.rate_hz;
+        Motion { name: "tracked".to_owned(), rate_hz, poses: evenly_timed(&log.tracked, rate_hz) }
+    }
+}
+
+/// Poses at a steady rate: what was not tracked, or not looked at, is bridged between its neighbours. A source that
+/// goes back in time (a loop, a seek) ends it.
+fn evenly_timed(tracked: &[TrackedSample], rate_hz: f32) -> Vec<MotionPose> {
+    let pose = |sample: &TrackedSample| MotionPose {
+        theta: sample.params.theta,
+        trans: sample.params.trans,
+    };
+    let Some(first) = tracked.first() else {
+        return Vec::new();
+    };
+    let secs = |sample: &TrackedSample| sample.timestamp - first.timestamp;
+    let mut poses = vec![pose(first)];
+    for pair in tracked.windows(2) {
+        let (from, to) = (secs(&pair[0]), secs(&pair[1]));
+        if to <= from || to - from > LONGEST_GAP_SECS {
+            break;
         }
+        loop {
+            let due = poses.len() as f64 / f64::from(rate_hz);
+            // A timestamp is some nanoseconds to either side of a multiple of the frame's time.
+            if due > to + 1e-6 {
+                break;
+            }
+            let share = ((due - from) / (to - from)).clamp(0.0, 1.0);
+            poses.push(pose(&pair[0]).interpolate(&pose(&pair[1]), share as f32));
+        }
+    }
+    poses
+}
+
+/// Fails now rather than after the work; an existing file stays as it is.
+fn check_writable(path: &Path) -> anyhow::Result<()> {
+    let opened = OpenOptions::new().append(true).create(true).open(path);
+    opened.map(drop).with_context(|| {
+        format!(
+            "{}: cannot write there; is the folder there and writable?",
+            path.display()
+        )
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use effigy_capture::{FrameId, Rigid3, Timestamp};
+    use effigy_registration::BodyParams;
+    use glam::Vec3;
+
+    use super::*;
+
+    #[test]
+    fn frames_that_were_not_tracked_take_their_time_all_the_same() {
+        let sample = |millis: u64| TrackedSample {
+            id: FrameId(millis),
+            timestamp: Timestamp(millis * 1_000_000),
+            params: BodyParams { trans: Vec3::X * millis as f32, ..BodyParams::ZERO },
+            world_from_camera: Rigid3::IDENTITY,
+            points_in_camera: Vec::new(),
+        };
+        let tracked = [0, 100, 200, 600, 700].map(sample);
+        let poses = evenly_timed(&tracked, 10.0);
+        assert_eq!(poses.len(), 8, "0.7 s at 10 Hz");
+        assert!(
+            (poses[4].trans.x - 400.0).abs() < 0.1,
+            "half-way between 200 and 600 ms"
+        );
+        let back_in_time = [0, 100, 50].map(sample);
+        assert_eq!(evenly_timed(&back_in_time, 10.0).len(), 2);
     }
 }

@@ -74,15 +74,7 @@ impl Publisher {
                 triangles: Arc::clone(&self.triangles),
             })
         });
-        let mesh = mesh.map(|mesh| {
-            Arc::new(AvatarView {
-                id: mesh.frame,
-                vertices: mesh.vertices.clone(),
-                normals: mesh.normals.clone(),
-                triangles: Arc::clone(&mesh.triangles),
-                colors: Arc::clone(&self.no_colors),
-            })
-        });
+        let mesh = mesh.map(|mesh| self.avatar_view(mesh));
         let state = state(&registered.tracking, registered.clean.timestamp, log);
         let keyframes = Arc::new(KeyframesView {
             collected: avatar.keyframe_count(),
@@ -107,6 +99,31 @@ impl Publisher {
                 snapshot.performance = Arc::new(performance);
             }
         });
+    }
+
+    /// Fine-tuning goes on though no frame comes any more.
+    pub(crate) fn waiting(&mut self, avatar: &AvatarStage) {
+        let training = self.training(avatar);
+        self.slot.update(|snapshot| snapshot.training = training);
+    }
+
+    /// The avatar in the last frame's pose.
+    pub(crate) fn avatar(&mut self, mesh: &AvatarMesh, avatar: &AvatarStage) {
+        let (view, training) = (self.avatar_view(mesh), self.training(avatar));
+        self.slot.update(|snapshot| {
+            snapshot.avatar = Some(view);
+            snapshot.training = training;
+        });
+    }
+
+    fn avatar_view(&self, mesh: &AvatarMesh) -> Arc<AvatarView> {
+        Arc::new(AvatarView {
+            id: mesh.frame,
+            vertices: mesh.vertices.clone(),
+            normals: mesh.normals.clone(),
+            triangles: Arc::clone(&mesh.triangles),
+            colors: Arc::clone(&self.no_colors),
+        })
     }
 
     pub(crate) fn finished(&self) {

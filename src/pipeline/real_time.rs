@@ -2,7 +2,10 @@
 
 use std::{
     panic::resume_unwind,
-    sync::Arc,
+    sync::{
+        Arc,
+        atomic::{AtomicBool, Ordering},
+    },
     thread::{self, ScopedJoinHandle},
     time::Duration,
 };
@@ -10,7 +13,7 @@ use std::{
 use anyhow::Context as _;
 use crossbeam::channel::{Receiver, RecvTimeoutError, Sender, TrySendError, bounded};
 use effigy_capture::{
-    Frame, FrameSource, Timestamp,
+    Frame, FrameId, FrameSource, Timestamp,
     replay::{Due, Pacer},
 };
 use effigy_registration::BodyModel;
@@ -59,17 +62,27 @@ pub(crate) fn run(
     let (to_track, frames) = bounded(QUEUE);
     let (to_drive, tracked) = bounded(QUEUE);
     let stale_frames = frames.clone();
+    let stop = AtomicBool::new(false);
     let mut log = RunLog::new(clock);
     thread::scope(|scope| {
+        let stop = &stop;
         let capture = thread::Builder::new()
             .name("capture".to_owned())
             .spawn_scoped(scope, move || {
-                capture(&mut *source, &to_track, &stale_frames, (clock, controls))
+                capture(
+                    &mut *source,
+                    &to_track,
+                    &stale_frames,
+                    (clock, controls, stop),
+                )
             })
             .context("cannot start the capture thread")?;
         let track = thread::Builder::new()
             .name("track".to_owned())
-            .spawn_scoped(scope, move || track(tracking, &frames, &to_drive))
+            .spawn_scoped(scope, move || {
+                let _stops = StopsCapture(stop);
+                track(tracking, &frames, &to_drive)
+            })
             .context("cannot start the tracking thread")?;
         let driven = drive(&tracked, avatar, outputs, (&mut log, controls));
         // Closes the queue, so that the threads before it end too.
@@ -77,13 +90,21 @@ pub(crate) fn run(
         joined(track)?;
         let captured = joined(capture)?;
         driven?;
-        log.delivered = captured.delivered;
-        log.dropped_by_us(captured.dropped);
+        log.captured(captured.delivered, captured.dropped, captured.missing);
         anyhow::Ok(())
     })?;
-    avatar.end()?;
+    outputs.wait_for_avatar(avatar)?;
     log.avatar_made(avatar);
     Ok(log)
+}
+
+/// When tracking ends, in whatever way, nothing more need be captured.
+struct StopsCapture<'a>(&'a AtomicBool);
+
+impl Drop for StopsCapture<'_> {
+    fn drop(&mut self) {
+        self.0.store(true, Ordering::Relaxed);
+    }
 }
 
 /// A thread's result; its panic goes on here.
@@ -95,6 +116,7 @@ fn joined<T>(thread: ScopedJoinHandle<'_, anyhow::Result<T>>) -> anyhow::Result<
 struct Captured {
     delivered: u64,
     dropped: u64,
+    missing: u64,
 }
 
 /// Delivers frames when their time has come; a frame that nobody took makes way for the next.
@@ -102,27 +124,37 @@ fn capture(
     source: &mut dyn FrameSource,
     to_track: &Sender<Delivered>,
     waiting: &Receiver<Delivered>,
-    (clock, controls): (Clock, &Controls),
+    (clock, controls, stop): (Clock, &Controls, &AtomicBool),
 ) -> anyhow::Result<Captured> {
     let mut captured = Captured::default();
     let mut pacer = Pacer::new(1.0);
-    let mut before: Option<Timestamp> = None;
-    while !interrupt::requested() {
-        let steered = controls.steer(source);
+    let mut before: Option<(FrameId, Timestamp)> = None;
+    let stopped = || interrupt::requested() || stop.load(Ordering::Relaxed);
+    while !stopped() {
+        let steered = controls.steer(source, stopped);
+        if stopped() {
+            break;
+        }
         if steered.waited || steered.jumped {
             pacer.restart();
         }
         let Some(frame) = source.next_frame()? else {
             break;
         };
-        let looped = before.is_some_and(|before| frame.timestamp < before);
-        before = Some(frame.timestamp);
+        let looped = before.is_some_and(|(_, before)| frame.timestamp < before);
+        let jumped = steered.jumped || looped;
+        if let Some((before, _)) = before
+            && !jumped
+        {
+            captured.missing += frame.id.0.saturating_sub(before.0 + 1);
+        }
+        before = Some((frame.id, frame.timestamp));
         let at = wait_until_due(&mut pacer, frame.timestamp, clock);
         captured.delivered += 1;
         let mut item = Delivered {
             frame,
             at,
-            jumped: steered.jumped || looped,
+            jumped,
             dropped_so_far: captured.dropped,
             playback: controls.playback(source.player()),
         };

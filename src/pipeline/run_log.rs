@@ -23,10 +23,14 @@ const POINTS_PER_FRAME: usize = 1500;
 /// Why a frame was not looked at.
 pub(crate) const TOO_LATE: &str = "tracking was busy";
 
+/// Why a frame never came: its number is missing.
+const MISSING: &str = "missing in the source";
+
 /// A tracked frame, reduced to what evaluation needs.
 #[derive(Clone, Debug)]
 pub(crate) struct TrackedSample {
     pub(crate) id: FrameId,
+    pub(crate) timestamp: Timestamp,
     pub(crate) params: BodyParams,
     pub(crate) world_from_camera: Rigid3,
     /// Cleaned depth points of the person.
@@ -86,8 +90,8 @@ impl RunLog {
         }
     }
 
+    /// Notes when the first frame came.
     pub(crate) fn delivered(&mut self, frame: &Frame) {
-        self.delivered += 1;
         self.first_frame.get_or_insert(frame.timestamp);
     }
 
@@ -110,6 +114,7 @@ impl RunLog {
             self.first_track.get_or_insert(registered.clean.timestamp);
             self.tracked.push(TrackedSample {
                 id: registered.id(),
+                timestamp: registered.clean.timestamp,
                 params: *params,
                 world_from_camera: registered.world_from_camera,
                 points_in_camera: person_points(registered),
@@ -118,11 +123,14 @@ impl RunLog {
         self.frames_since_first_track += u64::from(self.first_track.is_some());
     }
 
-    /// Frames that made way for newer ones.
-    pub(crate) fn dropped_by_us(&mut self, count: u64) {
-        self.dropped_so_far = count;
-        if count > 0 {
-            self.dropped.insert(TOO_LATE.to_owned(), count);
+    /// What capture counted: frames that came, that made way for newer ones, and that the source never had.
+    pub(crate) fn captured(&mut self, delivered: u64, too_late: u64, missing: u64) {
+        self.delivered = delivered;
+        self.dropped_so_far = too_late;
+        for (cause, count) in [(TOO_LATE, too_late), (MISSING, missing)] {
+            if count > 0 {
+                self.dropped.insert(cause.to_owned(), count);
+            }
         }
     }
 

@@ -2,13 +2,18 @@
 
 use std::{fs, path::Path};
 
-use anyhow::Context as _;
+use anyhow::{Context as _, ensure};
 use effigy_avatar::{
     canonicalise::CanonicaliseConfig, fine_tune::FineTuneConfig, keyframes::KeyframeConfig,
 };
 use effigy_fusion::clean::CleanConfig;
 use effigy_registration::track::TrackConfig;
 use serde::{Deserialize, Serialize};
+
+/// More would not be few shots any more, and fill the memory.
+pub(crate) const MOST_KEYFRAMES: usize = 64;
+
+const MOST_THREADS: usize = 256;
 
 /// One section a stage; what a file does not name keeps its default.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
@@ -50,7 +55,37 @@ impl Settings {
         };
         let text = fs::read_to_string(path)
             .with_context(|| format!("{}: cannot read the settings", path.display()))?;
-        toml::from_str(&text)
-            .with_context(|| format!("{}: these settings do not fit", path.display()))
+        let settings: Self = toml::from_str(&text)
+            .with_context(|| format!("{}: these settings do not fit", path.display()))?;
+        settings
+            .check()
+            .with_context(|| path.display().to_string())?;
+        Ok(settings)
+    }
+
+    /// Refuses what would run and mean nothing.
+    fn check(&self) -> anyhow::Result<()> {
+        let count = self.keyframes.count;
+        ensure!(
+            (1..=MOST_KEYFRAMES).contains(&count),
+            "keyframes.count is {count}, expected 1 to {MOST_KEYFRAMES}"
+        );
+        let steps = self.fine_tune.steps;
+        ensure!(
+            steps >= 1,
+            "fine_tune.steps is {steps}, expected at least 1"
+        );
+        let threads = self.fine_tune.threads.count;
+        ensure!(
+            threads <= MOST_THREADS,
+            "fine_tune.threads.count is {threads}, expected at most {MOST_THREADS}, or 0 for as many as there are cores"
+        );
+        if let Some([nearest, farthest]) = self.clean.range_m {
+            ensure!(
+                nearest >= 0.0 && nearest < farthest,
+                "clean.range_m is [{nearest}, {farthest}], expected the nearest depth, then the farthest"
+            );
+        }
+        Ok(())
     }
 }

@@ -111,6 +111,7 @@ fn snapshot(scene: &Scene, moment: Moment, playback: PlaybackView) -> Snapshot {
         "raise your arms"
     };
     Snapshot {
+        closing: false,
         source: Arc::new(SourceView {
             name: "synthetic figure".to_owned(),
             device: "CPU, 2 cores".to_owned(),

@@ -123,11 +123,8 @@ impl Window {
             self.screenshots
                 .take(context, self.screenshot_path(now_secs));
         }
-        if self
-            .options
-            .exit_after_secs
-            .is_some_and(|secs| now_secs >= f64::from(secs))
-        {
+        let exit_after_secs = self.options.exit_after_secs;
+        if snapshot.closing || exit_after_secs.is_some_and(|secs| now_secs >= f64::from(secs)) {
             context.send_viewport_cmd(ViewportCommand::Close);
         }
         if self.options.exit_after_secs.is_some() || self.options.screenshot.is_some() {

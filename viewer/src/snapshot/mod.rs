@@ -32,6 +32,8 @@ pub struct Snapshot {
     pub keyframes: Arc<KeyframesView>,
     pub training: Option<Arc<TrainingView>>,
     pub performance: Arc<PerformanceView>,
+    /// The program ends: the window closes.
+    pub closing: bool,
     /// One line of news for people: "avatar saved to out/avatar.glb".
     pub message: Option<Arc<str>>,
 }
