@@ -12,6 +12,8 @@ pub(super) struct Collider {
     normals: Vec<Vec3>,
     pub(super) now: Vec<Vec3>,
     before: Vec<Vec3>,
+    /// No point has moved further than this since the surface was placed.
+    pub(super) travel_m: f32,
     /// Border points: beyond them there is no surface.
     rim: Vec<bool>,
 }
@@ -26,8 +28,11 @@ pub(super) struct Touch {
     pub(super) distance_m: f32,
     /// How far the surface moved in this step.
     pub(super) moved: Vec3,
-    /// Where a next search may start.
-    pub(super) hint: u32,
+    /// Where on the surface; a next search may start from this triangle.
+    pub(super) triangle: u32,
+    pub(super) barycentric: Vec3,
+    /// Whether the surface ends here, so that nothing is inside or outside.
+    pub(super) on_rim: bool,
 }
 
 impl Collider {
@@ -39,6 +44,7 @@ impl Collider {
             normals: sheet.normals(),
             now: sheet.points.clone(),
             before: sheet.points.clone(),
+            travel_m: 0.0,
             rim: sheet
                 .border_links()
                 .iter()
@@ -50,8 +56,9 @@ impl Collider {
     /// Jumps to a place, at rest.
     pub(super) fn place(&mut self, points: &[Vec3]) {
         self.now.copy_from_slice(points);
-        self.moved();
         self.before.copy_from_slice(points);
+        self.moved();
+        self.travel_m = 0.0;
     }
 
     /// Moves on: what was the end of the last step is the start of this one.
@@ -64,13 +71,22 @@ impl Collider {
     }
 
     fn moved(&mut self) {
+        let steps = self.now.iter().zip(&self.before);
+        let furthest = steps
+            .map(|(now, before)| now.distance_squared(*before))
+            .fold(0.0, f32::max);
+        self.travel_m += furthest.sqrt();
         // Points that are not finite keep the surface where it was.
         if self.tree.refit_distances(&self.now).is_ok() {
             vertex_normals_into(&self.now, self.tree.triangles(), &mut self.normals);
         }
     }
 
-    /// The nearest point within reach, unless it lies on the rim.
+    pub(super) fn corners(&self, triangle: u32) -> [u32; 3] {
+        self.tree.triangles()[triangle as usize]
+    }
+
+    /// The nearest point within reach.
     pub(super) fn nearest(&self, point: Vec3, reach_m: f32, hint: u32) -> Option<Touch> {
         let mut within_m = reach_m;
         if hint != NONE {
@@ -80,9 +96,7 @@ impl Collider {
         let hit = self.tree.query_within(point, within_m)?;
         let corners = self.tree.triangles()[hit.triangle as usize].map(|v| v as usize);
         let weights = hit.barycentric;
-        if (0..3).all(|k| weights[k] == 0.0 || self.rim[corners[k]]) {
-            return None;
-        }
+        let on_rim = (0..3).all(|k| weights[k] == 0.0 || self.rim[corners[k]]);
         let blend = |of: &dyn Fn(usize) -> Vec3| -> Vec3 {
             (0..3).map(|k| of(corners[k]) * weights[k]).sum()
         };
@@ -101,7 +115,9 @@ impl Collider {
             normal,
             distance_m: sign * hit.distance,
             moved: blend(&|v| self.now[v] - self.before[v]),
-            hint: hit.triangle,
+            triangle: hit.triangle,
+            barycentric: weights,
+            on_rim,
         })
     }
 }

@@ -23,7 +23,7 @@ const HOOD_ABOVE_NECK_M: f32 = 0.050;
 
 /// The height of the seam between what follows the body and what hangs.
 pub(super) fn seam_height_m(form: &Form) -> f32 {
-    form.crotch_m() + SEAM_ABOVE_CROTCH_M
+    form.crotch_m + SEAM_ABOVE_CROTCH_M
 }
 
 /// The part of the body that a garment follows, in the cut pose.
@@ -63,7 +63,7 @@ pub(super) fn covered(form: &Form, pattern: &Pattern) -> Sheet {
 
 /// The part of a surface where a field of its points is not negative.
 pub(super) fn clipped_by(sheet: &Sheet, field: impl Fn(Vec3) -> f32) -> Sheet {
-    let mut fields = vec![sheet.points.iter().map(|&p| field(p)).collect()];
+    let mut fields = [sheet.points.iter().map(|&p| field(p)).collect()];
     clipped(sheet, 0, &mut fields).largest_part()
 }
 
@@ -127,7 +127,7 @@ fn behind_face(form: &Form) -> Vec<f32> {
 }
 
 /// Cuts along the zero line of one field; the values of all fields follow to new points.
-fn clipped(sheet: &Sheet, number: usize, fields: &mut Vec<Vec<f32>>) -> Sheet {
+fn clipped(sheet: &Sheet, number: usize, fields: &mut [Vec<f32>]) -> Sheet {
     let mut points = sheet.points.clone();
     let mut crossings: BTreeMap<[u32; 2], u32> = BTreeMap::new();
     let mut triangles = Vec::new();

@@ -88,7 +88,10 @@ fn tuck(mesh: &mut TriangleMesh, layers: &[u8], garments: &[Collider]) {
             let Some(touch) = garment.nearest(mesh.vertices[v], TUCK_REACH_M, NONE) else {
                 continue;
             };
-            if touch.distance_m > -TUCK_M && touch.normal.dot(mesh.normals[v]) > 0.3 {
+            if !touch.on_rim
+                && touch.distance_m > -TUCK_M
+                && touch.normal.dot(mesh.normals[v]) > 0.3
+            {
                 mesh.vertices[v] -= touch.normal * (touch.distance_m + TUCK_M);
             }
         }

@@ -30,6 +30,8 @@ pub(super) struct Form {
     pub(super) joints: [Vec3; JOINT_COUNT],
     /// From the zero pose to this one.
     pub(super) bones: BoneTransforms,
+    /// The height of the lowest point of the trunk between the legs.
+    pub(super) crotch_m: f32,
 }
 
 /// A horizontal outline around the legs: convex, counter-clockwise seen from above.
@@ -68,6 +70,7 @@ impl Form {
             joints: joints.map(|joint| joint + pose.trans),
             surface,
             bones,
+            crotch_m: crotch_m(person) + pose.trans.y,
         }
     }
 
@@ -103,6 +106,11 @@ impl Form {
         }
     }
 
+    pub(super) fn nearest_vertex(&self, point: Vec3) -> u32 {
+        let hit = self.tree.query(point);
+        self.surface.triangles[hit.triangle as usize][hit.barycentric.max_position()]
+    }
+
     /// Whether a point is nearer to trunk and legs than to a hand that hangs beside them.
     pub(super) fn trunk_side(&self, point: Vec3) -> bool {
         let hit = self.tree.query(point);
@@ -116,8 +124,8 @@ impl Form {
         let mut shares = [0.0; JOINT_COUNT];
         let hit = self.tree.query(point);
         let corners = self.surface.triangles[hit.triangle as usize];
-        for k in 0..3 {
-            let weights = &self.skinning[corners[k] as usize];
+        for (corner, part) in corners.into_iter().zip(hit.barycentric.to_array()) {
+            let weights = &self.skinning[corner as usize];
             for (&bone, &weight) in weights.bones.iter().zip(&weights.weights) {
                 let bone = match bone {
                     4 | 7 | 10 if hangs => 1,
@@ -125,7 +133,7 @@ impl Form {
                     3 | 6 | 13..=23 if hangs => 0,
                     other => other,
                 };
-                shares[bone as usize] += weight * hit.barycentric[k];
+                shares[bone as usize] += weight * part;
             }
         }
         shares
@@ -139,16 +147,6 @@ impl Form {
         } else {
             y(4) + (y(7) - y(4)) * (station - 1.0)
         }
-    }
-
-    /// The lowest point of the trunk between the legs.
-    pub(super) fn crotch_m(&self) -> f32 {
-        let middle = self.joints[0].x;
-        let points = self.surface.points.iter().zip(&self.chart.places);
-        points
-            .filter(|(p, place)| (p.x - middle).abs() < 0.012 && place.foot_share < 0.1)
-            .map(|(p, _)| p.y)
-            .fold(f32::MAX, f32::min)
     }
 
     /// The convex outline of trunk and legs at a height.
@@ -182,6 +180,16 @@ impl Outline {
         }
         radius_m
     }
+}
+
+/// The lowest point between the legs, looked for with the legs so far apart that they do not touch.
+fn crotch_m(person: &Person) -> f32 {
+    const APART_RAD: f32 = 0.4;
+    let apart = cut_pose(APART_RAD, 0.0);
+    let points = person.clothed_posed_vertices(&apart.theta, apart.trans);
+    let middle = person.rest_joints[0].x;
+    let inner = points.iter().filter(|p| (p.x - middle).abs() < 0.012);
+    inner.map(|p| p.y).fold(f32::MAX, f32::min)
 }
 
 /// Andrew's monotone chain.

@@ -20,11 +20,20 @@ impl Wear {
             .collect()
     }
 
-    /// Every point of every garment in star pose.
-    pub fn garments_in_star_pose(&self) -> Vec<Vec3> {
+    /// For every point of every garment, how it lies from the body's vertex it was cut over, in star pose.
+    pub fn offsets_in_star_pose_m(&self) -> Vec<Vec3> {
+        let minimal = self.person().minimal_canonical(&self.pose().theta);
         let garments = self.garments().iter().zip(self.points());
         garments
-            .flat_map(|(garment, points)| self.in_star_pose(points, &garment.weights))
+            .flat_map(|(garment, points)| {
+                let lying = self.in_star_pose(points, &garment.weights);
+                let homes = garment.home.iter().map(|&v| minimal[v as usize]);
+                lying
+                    .into_iter()
+                    .zip(homes)
+                    .map(|(point, home)| point - home)
+                    .collect::<Vec<_>>()
+            })
             .collect()
     }
 }

@@ -18,6 +18,9 @@ mod tape;
 mod wear;
 mod weights;
 
+#[cfg(test)]
+mod tests;
+
 pub use envelope::ClothedSurface;
 pub use measure::{rms_between_m, strays_m};
 pub use pattern::{ClothKind, Ease, Fabric, Front, Limbs, Pattern, Top};

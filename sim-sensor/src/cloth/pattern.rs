@@ -70,12 +70,12 @@ pub struct Fabric {
 }
 
 const JERSEY: Fabric =
-    Fabric { stretch_compliance: 1.0e-7, bend_compliance: 4.0e-4, friction: 0.2, drag: 1.5 };
+    Fabric { stretch_compliance: 1.0e-7, bend_compliance: 4.0e-4, friction: 0.2, drag: 2.0 };
 const FLEECE: Fabric = Fabric { bend_compliance: 5.0e-5, ..JERSEY };
 const TWILL: Fabric =
-    Fabric { stretch_compliance: 3.0e-8, bend_compliance: 8.0e-5, friction: 0.2, drag: 1.2 };
+    Fabric { stretch_compliance: 3.0e-8, bend_compliance: 8.0e-5, friction: 0.12, drag: 2.0 };
 const SUITING: Fabric = Fabric { bend_compliance: 3.0e-5, friction: 0.15, ..TWILL };
-const CREPE: Fabric = Fabric { bend_compliance: 6.0e-4, friction: 0.15, ..JERSEY };
+const CREPE: Fabric = Fabric { bend_compliance: 6.0e-4, friction: 0.15, drag: 3.0, ..JERSEY };
 
 /// Clothes by name, to be simulated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -141,7 +141,13 @@ impl ClothKind {
                 let close = Tailor { fit: 0.12, ..tailor };
                 vec![tailor.slim_trousers(), close.undershirt(), tailor.blazer()]
             }
-            Self::Skirt => vec![tailor.skirt(), Tailor { fit: 0.5 * fit, ..tailor }.tshirt()],
+            Self::Skirt => {
+                let tucked_in = Tailor { fit: 0.1 + 0.25 * fit, ..tailor };
+                vec![
+                    Pattern { hem: Some(0.06), ..tucked_in.tshirt() },
+                    tailor.skirt(),
+                ]
+            }
             Self::Dress => vec![tailor.dress()],
         }
     }

@@ -45,6 +45,8 @@ pub struct Garment {
     pub(super) laid_out: Vec<Vec3>,
     /// Skinning weights, diffused over the garment.
     pub weights: Vec<VertexWeights>,
+    /// The body's vertex nearest to each point when it was cut.
+    pub home: Vec<u32>,
     pub(super) held: Vec<Held>,
 }
 
@@ -85,13 +87,18 @@ pub(super) fn sew(form: &Form, pattern: &Pattern, inner: &[Garment], put_on: &Fo
     }
     let weights = weights::diffused(form, &sheet, pattern);
     let held = held(form, pattern, &sheet);
+    let home = sheet
+        .points
+        .iter()
+        .map(|&point| form.nearest_vertex(point))
+        .collect();
     let mut laid_out = sheet.clone();
     for (point, weights) in laid_out.points.iter_mut().zip(&weights) {
         let at_rest = form.bones.blend(weights).inverse().transform_point3(*point);
         *point = put_on.bones.blend(weights).transform_point3(at_rest);
     }
     Under::new(put_on, inner).push_out(&mut laid_out);
-    Garment { pattern: *pattern, rest: sheet, laid_out: laid_out.points, weights, held }
+    Garment { pattern: *pattern, rest: sheet, laid_out: laid_out.points, weights, home, held }
 }
 
 fn edge_for(area_m2: f32) -> f32 {

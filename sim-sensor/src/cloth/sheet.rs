@@ -1,6 +1,6 @@
 //! An open triangle mesh while it is cut and sewn: edges, borders, neighbours, smoothing.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use glam::Vec3;
 
@@ -101,14 +101,14 @@ impl Sheet {
     /// For each point, the points before and after it along the border; `NONE` inside.
     pub(super) fn border_links(&self) -> Vec<[u32; 2]> {
         let mut links = vec![[NONE; 2]; self.points.len()];
-        let mut directed: BTreeMap<[u32; 2], ()> = BTreeMap::new();
+        let mut directed: BTreeSet<[u32; 2]> = BTreeSet::new();
         for &[a, b, c] in &self.triangles {
             for side in [[a, b], [b, c], [c, a]] {
-                directed.insert(side, ());
+                directed.insert(side);
             }
         }
-        for &[from, to] in directed.keys() {
-            if !directed.contains_key(&[to, from]) {
+        for &[from, to] in &directed {
+            if !directed.contains(&[to, from]) {
                 links[from as usize][1] = to;
                 links[to as usize][0] = from;
             }
@@ -134,14 +134,6 @@ impl Sheet {
             }
         }
         loops
-    }
-
-    /// The ends of every edge.
-    pub fn edge_ends(&self) -> Vec<[usize; 2]> {
-        self.edges()
-            .iter()
-            .map(|edge| edge.ends.map(|v| v as usize))
-            .collect()
     }
 
     pub(super) fn normals(&self) -> Vec<Vec3> {

@@ -4,9 +4,9 @@
 use glam::Vec3;
 
 use super::{
-    collider::Collider,
+    collider::{Collider, Touch},
     sew::{Garment, Held},
-    sheet::NONE,
+    sheet::{Edge, NONE},
 };
 
 const GRAVITY: Vec3 = Vec3::new(0.0, -9.81, 0.0);
@@ -16,6 +16,8 @@ const MAX_SPEED_M_S: f32 = 12.0;
 const REACH_M: f32 = 0.035;
 /// Contacts are kept ready this far beyond touching.
 const MARGIN_M: f32 = 0.004;
+/// Cloth on cloth moves along with it, by this share in each step.
+const LAYER_CLING: f32 = 0.25;
 /// Edges bent more than this in the rest shape are folds that stay.
 const CREASE_COSINE: f32 = 0.8;
 /// Folds that stay are this much stiffer.
@@ -33,8 +35,8 @@ pub(super) struct Cloth {
     /// Where what is held should be at the end of the step.
     pub(super) anchors: Vec<Vec3>,
     contacts: Vec<Contact>,
-    /// For each collider, where each point's last search ended.
-    hints: Vec<Vec<u32>>,
+    /// For each obstacle and point.
+    searches: Vec<Vec<Search>>,
     friction: f32,
     drag: f32,
 }
@@ -59,6 +61,22 @@ struct Bend {
     lambda: f32,
 }
 
+/// What is known about a surface near a point.
+#[derive(Clone, Copy, Debug)]
+struct Search {
+    /// The triangle found last.
+    hint: u32,
+    /// The surface is at least this far away.
+    clear_m: f32,
+    /// Where the point and how far the surface was then.
+    from: Vec3,
+    travel_m: f32,
+}
+
+impl Search {
+    const NEVER: Self = Self { hint: NONE, clear_m: 0.0, from: Vec3::ZERO, travel_m: 0.0 };
+}
+
 /// A point that must stay on its side of a plane.
 #[derive(Clone, Copy, Debug)]
 struct Contact {
@@ -67,12 +85,30 @@ struct Contact {
     offset_m: f32,
     moved: Vec3,
     pushed_m: f32,
+    /// What was touched, and where.
+    obstacle: usize,
+    triangle: u32,
+    barycentric: Vec3,
 }
 
 /// What a garment touches: how near it may come to each surface.
 pub(super) struct Obstacle<'a> {
     pub(super) collider: &'a Collider,
     pub(super) thickness_m: f32,
+    /// What is further inside than this is left alone: thin cloth has an inside for no more than that.
+    pub(super) deepest_m: f32,
+    /// The furthest a point is pushed out in one step.
+    pub(super) push_m: f32,
+}
+
+impl<'a> Obstacle<'a> {
+    pub(super) fn body(collider: &'a Collider, thickness_m: f32) -> Self {
+        Self { collider, thickness_m, deepest_m: REACH_M, push_m: REACH_M }
+    }
+
+    pub(super) fn layer(collider: &'a Collider, thickness_m: f32) -> Self {
+        Self { collider, thickness_m, deepest_m: 0.010, push_m: 0.001 }
+    }
 }
 
 impl Cloth {
@@ -81,7 +117,13 @@ impl Cloth {
         let fabric = &garment.pattern.fabric;
         let at = |v: u32| points[v as usize];
         let edges = garment.rest.edges();
-        let stretches = edges
+        // From top to bottom: what hangs is carried by what was just settled.
+        let mut downwards: Vec<_> = edges.iter().collect();
+        downwards.sort_by(|e, f| {
+            let height = |edge: &Edge| at(edge.ends[0]).y + at(edge.ends[1]).y;
+            height(f).total_cmp(&height(e))
+        });
+        let stretches = downwards
             .iter()
             .map(|edge| Stretch {
                 ends: edge.ends,
@@ -108,18 +150,18 @@ impl Cloth {
             anchors: vec![Vec3::ZERO; garment.held.len()],
             held: garment.held.clone(),
             contacts: Vec::new(),
-            hints: Vec::new(),
+            searches: Vec::new(),
             friction: fabric.friction,
             drag: fabric.drag,
         }
     }
 
     /// Forgets where searches ended, so that a state needs positions and velocities only.
-    pub(super) fn forget_hints(&mut self, colliders: usize) {
-        self.hints.resize(colliders, Vec::new());
-        for hints in &mut self.hints {
-            hints.clear();
-            hints.resize(self.points.len(), NONE);
+    pub(super) fn forget_searches(&mut self, obstacles: usize) {
+        self.searches.resize(obstacles, Vec::new());
+        for searches in &mut self.searches {
+            searches.clear();
+            searches.resize(self.points.len(), Search::NEVER);
         }
     }
 
@@ -162,6 +204,34 @@ impl Cloth {
         for v in 0..self.points.len() {
             self.velocities[v] = (self.points[v] - self.before[v]) / secs;
         }
+        // Nothing bounces off: being pushed out of a surface is no reason to fly away from it.
+        for contact in self
+            .contacts
+            .iter()
+            .filter(|contact| contact.pushed_m > 0.0)
+        {
+            let velocity = &mut self.velocities[contact.point as usize];
+            let away = (*velocity - contact.moved / secs).dot(contact.normal);
+            *velocity -= contact.normal * away.max(0.0);
+            if contact.obstacle > 0 {
+                *velocity = velocity.lerp(contact.moved / secs, LAYER_CLING);
+            }
+        }
+    }
+
+    /// How the last step pushed garments underneath: which obstacle, at which triangle, and by how much.
+    pub(super) fn reactions(&self) -> impl Iterator<Item = (usize, u32, Vec3, Vec3)> + '_ {
+        let pushing = self.contacts.iter();
+        pushing
+            .filter(|contact| contact.obstacle > 0 && contact.pushed_m > 0.0)
+            .map(|c| {
+                (
+                    c.obstacle,
+                    c.triangle,
+                    c.barycentric,
+                    -c.normal * c.pushed_m,
+                )
+            })
     }
 
     /// Where every point is outside of everything, without a push that would move it on.
@@ -176,21 +246,41 @@ impl Cloth {
 
     fn find_contacts(&mut self, obstacles: &[Obstacle<'_>]) {
         self.contacts.clear();
-        for (obstacle, hints) in obstacles.iter().zip(&mut self.hints) {
+        let searched = obstacles.iter().zip(&mut self.searches).enumerate();
+        for (number, (obstacle, searches)) in searched {
+            let near_m = obstacle.thickness_m + MARGIN_M;
             for (v, &point) in self.points.iter().enumerate() {
-                let Some(touch) = obstacle.collider.nearest(point, REACH_M, hints[v]) else {
-                    continue;
-                };
-                hints[v] = touch.hint;
-                if touch.distance_m > obstacle.thickness_m + MARGIN_M {
+                let search = &mut searches[v];
+                // Far enough away last time, and neither has moved enough since.
+                let travel_m = obstacle.collider.travel_m;
+                let moved_m = point.distance(search.from) + travel_m - search.travel_m;
+                if search.clear_m - moved_m > near_m {
                     continue;
                 }
+                let touch = obstacle.collider.nearest(point, REACH_M, search.hint);
+                *search = Search {
+                    hint: touch.map_or(search.hint, |touch| touch.triangle),
+                    clear_m: touch.map_or(REACH_M, |touch| touch.distance_m.max(0.0)),
+                    from: point,
+                    travel_m,
+                };
+                let touches = |touch: &Touch| {
+                    let within = -obstacle.deepest_m..=near_m;
+                    within.contains(&touch.distance_m) && !touch.on_rim
+                };
+                let Some(touch) = touch.filter(touches) else {
+                    continue;
+                };
+                let out_m = touch.normal.dot(touch.point) + obstacle.thickness_m;
                 self.contacts.push(Contact {
                     point: v as u32,
                     normal: touch.normal,
-                    offset_m: touch.normal.dot(touch.point) + obstacle.thickness_m,
+                    offset_m: out_m.min(touch.normal.dot(point) + obstacle.push_m),
                     moved: touch.moved,
                     pushed_m: 0.0,
+                    obstacle: number,
+                    triangle: touch.triangle,
+                    barycentric: touch.barycentric,
                 });
             }
         }

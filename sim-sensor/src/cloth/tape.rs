@@ -54,7 +54,7 @@ impl Tape {
         while now < frame {
             now += 1;
             self.wear.step(&pose_of(now), self.secs_per_frame);
-            if now % self.spacing == 0 && !self.keys.contains_key(&now) {
+            if now.is_multiple_of(self.spacing) && !self.keys.contains_key(&now) {
                 self.keys.insert(now, self.wear.state());
                 self.thin_out();
             }
@@ -67,7 +67,7 @@ impl Tape {
         if self.keys.len() > MAX_KEYS {
             self.spacing *= 2;
             let spacing = self.spacing;
-            self.keys.retain(|frame, _| frame % spacing == 0);
+            self.keys.retain(|frame, _| frame.is_multiple_of(spacing));
         }
     }
 }

@@ -55,6 +55,9 @@ const WARM_UP_RATE_HZ: f32 = 30.0;
 /// A body that jumps further than this between two poses takes its clothes along as if they were skin.
 const JUMP_M: f32 = 0.35;
 const MAX_STEPS: usize = 48;
+/// Garments give way to those over them: by this share of each push, and no further than that in one step.
+const REACTION: f32 = 0.3;
+const MAX_REACTION_M: f32 = 0.0005;
 /// How far hips and knees are bent while trousers are cut.
 const SEAT_RAD: f32 = 0.6;
 /// Cloth is never perfectly even; the seed decides where it buckles.
@@ -167,11 +170,6 @@ impl Wear {
         self.cloths.iter().flat_map(Cloth::strains)
     }
 
-    /// As [`Self::strains`], of one garment.
-    pub fn strains_of(&self, garment: usize) -> Vec<f32> {
-        self.cloths[garment].strains().collect()
-    }
-
     /// The body with shoes and hair where the clothes feel it.
     pub fn body_points(&self) -> &[Vec3] {
         &self.body.now
@@ -209,7 +207,7 @@ impl Wear {
         let parts = (secs / POSE_SECS - 1e-3).ceil().clamp(1.0, 240.0) as usize;
         let from = self.pose;
         for cloth in &mut self.cloths {
-            cloth.forget_hints(self.garments.len() + 1);
+            cloth.forget_searches(self.garments.len() + 1);
         }
         for part in 1..=parts {
             let next = if part == parts {
@@ -305,12 +303,20 @@ impl Wear {
     fn step_cloths(&mut self, secs: f32) {
         let count = self.cloths.len();
         for number in 0..count {
-            let mut obstacles =
-                vec![Obstacle { collider: &self.body, thickness_m: self.config.skin_m }];
+            let mut obstacles = vec![Obstacle::body(&self.body, self.config.skin_m)];
             for inner in &self.layers[..number] {
-                obstacles.push(Obstacle { collider: inner, thickness_m: self.config.layer_m });
+                obstacles.push(Obstacle::layer(inner, self.config.layer_m));
             }
             self.cloths[number].step(secs, self.config.iterations, &obstacles);
+            let (inner, outer) = self.cloths.split_at_mut(number);
+            for (obstacle, triangle, barycentric, push) in outer[0].reactions() {
+                // The body is the first obstacle; garments follow from the innermost.
+                let corners = self.layers[obstacle - 1].corners(triangle);
+                let push = REACTION * push.clamp_length_max(MAX_REACTION_M);
+                for (corner, part) in corners.into_iter().zip(barycentric.to_array()) {
+                    inner[obstacle - 1].points[corner as usize] += push * part;
+                }
+            }
             if number + 1 < count {
                 let points = self.cloths[number].points.iter().copied();
                 self.layers[number].advance(points);
@@ -321,7 +327,7 @@ impl Wear {
     /// Removes what little the last step left inside of something.
     fn finish(&mut self) {
         for number in 0..self.cloths.len() {
-            let body = Obstacle { collider: &self.body, thickness_m: 0.7 * self.config.skin_m };
+            let body = Obstacle::body(&self.body, 0.7 * self.config.skin_m);
             self.cloths[number].push_out(&[body]);
             let points = self.cloths[number].points.clone();
             self.layers[number].place(&points);

@@ -39,7 +39,7 @@ pub(super) fn diffused(form: &Form, sheet: &Sheet, pattern: &Pattern) -> Vec<Ver
             }
         }
     }
-    shares.iter().map(|share| largest_four(share)).collect()
+    shares.iter().map(largest_four).collect()
 }
 
 fn largest_four(shares: &[f32; JOINT_COUNT]) -> VertexWeights {

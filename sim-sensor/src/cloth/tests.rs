@@ -1,0 +1,239 @@
+//! What simulated clothes claim: outside the body, as long as they were cut, at rest when the person is, the
+//! same again from the same seed, and different after another movement.
+
+use std::sync::Arc;
+
+use effigy_capture::{FrameId, FrameSource as _};
+use effigy_fusion::mesh::topology::edge_report;
+use effigy_registration::{
+    motion::{MotionPose, Routine},
+    smpl::builtin,
+};
+use glam::Vec3;
+
+use super::*;
+use crate::{Outfit, OutfitKind, Person, Scenario, SimulatedSensor, Truth, person::sample_betas};
+
+const FRAME_SECS: f32 = 1.0 / 30.0;
+
+fn wear(kind: ClothKind, fit: f32, seed: u64) -> Wear {
+    // Less time to settle than the default: the suite has to stay short.
+    let config = ClothConfig { approach_secs: 0.5, settle_secs: 0.3, ..ClothConfig::default() };
+    let body = builtin::body();
+    let betas = sample_betas(&body, seed);
+    let person = Arc::new(Person::new(body, betas, Outfit::UNDER, seed));
+    Wear::new(person, kind, fit, seed, config)
+}
+
+/// The first frames of a movement.
+fn opening(wear: &Wear, routine: Routine, frames: usize) -> Vec<MotionPose> {
+    let motion = routine.motion(&wear.person().rest_body(), FRAME_SECS.recip(), 1);
+    motion.poses.into_iter().take(frames).collect()
+}
+
+fn share(values: impl IntoIterator<Item = bool>) -> f32 {
+    let (mut yes, mut all) = (0, 0);
+    for value in values {
+        yes += usize::from(value);
+        all += 1;
+    }
+    yes as f32 / all.max(1) as f32
+}
+
+#[test]
+fn garments_are_whole_surfaces_with_as_many_openings_as_they_should_have() {
+    for (kind, fit, seed) in [
+        (ClothKind::BlazerTrousers, 0.2, 1),
+        (ClothKind::PoloTrousers, 1.0, 3),
+        (ClothKind::Skirt, 0.5, 4),
+    ] {
+        for garment in wear(kind, fit, seed).garments() {
+            let pattern = &garment.pattern;
+            let expected = match (pattern.front, pattern.limbs) {
+                // Neck, front edges and hem of a jacket are one border.
+                (Front::Open, _) | (_, Limbs::Legs { .. }) => 3,
+                (_, Limbs::Arms { .. }) => 4,
+                (_, Limbs::None) => 2,
+            };
+            let name = (kind.name(), pattern.name);
+            assert_eq!(garment.rest.border_loops().len(), expected, "{name:?}");
+            let report = edge_report(&garment.rest.triangles);
+            let wrong = report.non_manifold + report.flipped + report.degenerate;
+            assert_eq!(wrong, 0, "{name:?}: {report:?}");
+            let points = garment.rest.points.len();
+            assert!((2000..4500).contains(&points), "{name:?}: {points} points");
+            for weights in &garment.weights {
+                let sum: f32 = weights.weights.iter().sum();
+                assert!((sum - 1.0).abs() < 1e-4, "{name:?}: weights sum to {sum}");
+            }
+        }
+    }
+}
+
+#[test]
+fn cloth_stays_outside_the_body_and_keeps_its_size_while_arms_are_raised() {
+    let mut wear = wear(ClothKind::LongsleeveWideTrousers, 0.8, 2);
+    let poses = opening(&wear, Routine::RaiseArms, 45);
+    wear.start(&poses[0]);
+    let (mut deep, mut strained) = (Vec::new(), Vec::new());
+    for (number, pose) in poses.iter().enumerate() {
+        wear.step(pose, FRAME_SECS);
+        strained.extend(wear.strains().map(|strain| strain.abs() > 0.15));
+        if number % 5 == 0 {
+            deep.extend(wear.clearances_m().into_iter().map(|m| m < -0.002));
+        }
+    }
+    let (deep, strained) = (share(deep), share(strained));
+    assert!(deep < 1e-3, "{deep} of all points are deeper than 2 mm");
+    assert!(
+        strained < 0.01,
+        "{strained} of all edges are strained beyond 15 %"
+    );
+}
+
+#[test]
+fn a_loose_dress_moves_with_the_pose_remembers_how_it_came_there_and_comes_to_rest() {
+    let mut standing = wear(ClothKind::Dress, 0.9, 1);
+    let stance = opening(&standing, Routine::Stand, 1)[0];
+    standing.start(&stance);
+    let mut offsets = Vec::new();
+    let mut settled = Vec::new();
+    for routine in [Routine::RaiseArms, Routine::Squat] {
+        let mut wear = standing.clone();
+        for (number, pose) in opening(&wear, routine, 36).iter().enumerate() {
+            wear.step(pose, FRAME_SECS);
+            if number % 6 == 0 {
+                offsets.push(wear.offsets_in_star_pose_m());
+            }
+        }
+        let from = *wear.pose();
+        for frame in 1..=66 {
+            let pose = from.interpolate(&stance, (frame as f32 / 12.0).min(1.0));
+            wear.step(&pose, FRAME_SECS);
+        }
+        let speeds: Vec<f32> = wear.speeds_m_s().collect();
+        let moving = share(speeds.iter().map(|&speed| speed > 0.05));
+        assert!(
+            moving < 0.05,
+            "{moving} of the points still move faster than 50 mm/s"
+        );
+        settled.push(wear.points().flatten().copied().collect::<Vec<Vec3>>());
+    }
+    let strays = strays_m(&offsets);
+    let varies_m = (strays.iter().map(|m| m * m).sum::<f32>() / strays.len() as f32).sqrt();
+    assert!(
+        varies_m > 0.010,
+        "offsets vary by {varies_m} m rms over poses"
+    );
+    let floor_m = rms_between_m(&settled[0], &settled[1]);
+    assert!(
+        floor_m > 0.002,
+        "the same pose after another movement: {floor_m} m rms apart"
+    );
+    println!("offsets vary by {varies_m} m rms; history floor {floor_m} m rms");
+}
+
+#[test]
+fn frames_are_the_same_bits_in_any_order_and_from_any_thread() {
+    let poses = opening(&wear(ClothKind::Dress, 0.5, 5), Routine::WalkInPlace, 40);
+    let frames = |order: &[u64]| -> Vec<Vec<Vec3>> {
+        let mut tape = Tape::new(wear(ClothKind::Dress, 0.5, 5), FRAME_SECS.recip());
+        let mut seen = Vec::new();
+        for &frame in order {
+            let wear = tape.at(frame, |number| poses[number as usize]);
+            seen.push(wear.points().flatten().copied().collect());
+        }
+        seen
+    };
+    let there_and_back = frames(&[2, 20, 18, 2]);
+    let elsewhere = std::thread::scope(|scope| {
+        scope
+            .spawn(|| frames(&[18, 20]))
+            .join()
+            .expect("the other thread does the same")
+    });
+    assert_eq!(there_and_back[0], there_and_back[3], "back to the start");
+    assert_eq!(there_and_back[2], elsewhere[0], "over a kept state");
+    assert_eq!(there_and_back[1], elsewhere[1], "in another thread");
+    assert!(
+        there_and_back[0] != there_and_back[2],
+        "a walk moves a dress"
+    );
+}
+
+#[test]
+fn the_envelope_is_what_can_be_seen_and_a_skirt_does_not_tear_in_star_pose() {
+    let mut wear = wear(ClothKind::Skirt, 0.8, 1);
+    let poses = opening(&wear, Routine::WalkInPlace, 24);
+    wear.start(&poses[0]);
+    for pose in &poses {
+        wear.step(pose, FRAME_SECS);
+    }
+    let whole = wear.surface();
+    let seen = whole.clone().envelope();
+    assert_eq!(seen.posed.triangles, seen.canonical.triangles);
+    let skin = |surface: &ClothedSurface| {
+        let corners = surface.posed.triangles.iter();
+        corners
+            .filter(|t| surface.layers[t[0] as usize] == 0)
+            .count()
+    };
+    // Trunk and thighs are about 0.3 of the body's triangles, hands and head most of the others.
+    let left = skin(&seen) as f32 / skin(&whole) as f32;
+    assert!((0.3..0.9).contains(&left), "{left} of the skin can be seen");
+    let facing = share(seen.canonical.triangles.iter().map(|t| {
+        let [a, b, c] = t.map(|v| seen.canonical.vertices[v as usize]);
+        let normals: Vec3 = t.iter().map(|&v| seen.canonical.normals[v as usize]).sum();
+        (b - a).cross(c - a).dot(normals) > 0.0
+    }));
+    assert!(
+        facing > 0.95,
+        "normals of {facing} agree with their triangles"
+    );
+    let torn = share(seen.canonical.triangles.iter().flat_map(|&[a, b, c]| {
+        [[a, b], [b, c], [c, a]].map(|ends| {
+            let length =
+                |points: &[Vec3]| points[ends[0] as usize].distance(points[ends[1] as usize]);
+            length(&seen.canonical.vertices) > 3.0 * length(&seen.posed.vertices) + 0.01
+        })
+    }));
+    assert!(torn < 0.002, "{torn} of the edges are torn apart");
+}
+
+#[test]
+fn a_scenario_asks_for_cloth_by_name_and_sensor_and_truth_agree() {
+    let json = r#"{"version":1,"outfit":"dress","fit":0.7,"motion":{"routine":"stand"},"sensor":"oak","noise":"none"}"#;
+    let scenario = Scenario::from_json(json).expect("the outfit has a name");
+    assert_eq!(scenario.outfit, OutfitKind::from(ClothKind::Dress));
+    assert!(
+        !Scenario::default().to_json().contains("\"fit\""),
+        "old scenarios are written as ever"
+    );
+    let body = builtin::body();
+    let truth = Truth::new(&scenario, Arc::clone(&body))
+        .expect("valid")
+        .at(FrameId(1));
+    let mut sensor = SimulatedSensor::new(&scenario, body).expect("valid");
+    let intrinsics = sensor.calibration().depth.intrinsics;
+    let view = sensor.view(FrameId(1));
+    let tree = effigy_fusion::mesh::closest_point::ClosestPoint::from_mesh(&truth.clothed_in_world)
+        .expect("the envelope has triangles");
+    let (mut near, mut all) = (0, 0);
+    for pixel in (0..intrinsics.pixel_count()).step_by(7) {
+        if view.labels[pixel].is_person() {
+            let point = truth.world_from_camera * view.point(pixel).expect("a person has depth");
+            all += 1;
+            near += usize::from(tree.query(point).distance < 0.001);
+        }
+    }
+    assert!(all > 500, "the person is in view: {all} pixels");
+    // The inside of a hem may be seen by the sensor and is not part of the outer envelope.
+    assert!(
+        near as f32 > 0.99 * all as f32,
+        "{near} of {all} pixels see the true envelope"
+    );
+    assert_eq!(
+        truth.clothed_canonical.len(),
+        truth.clothed_in_world.vertices.len()
+    );
+}
