@@ -84,9 +84,6 @@ fn run_chain(
     let body = body_model(args.body.as_deref())?;
     let mut settings = Settings::load(args.config.as_deref())?;
     settings.keyframes.count = args.keyframes.unwrap_or(settings.keyframes.count);
-    if input.pace == Pace::RealTime && settings.fine_tune.threads.count == 0 {
-        settings.fine_tune.threads.count = threads_beside_a_live_chain();
-    }
     let name = input.source.name();
     let calibration = input.source.calibration().clone();
     let mut outputs = Outputs::new(args, &calibration, input.source.frame_count(), &body)?;
@@ -145,11 +142,6 @@ fn run_chain(
     }
     println!("{report}\nwritten to {}", args.out.display());
     Ok(())
-}
-
-/// A core is left to what must not hitch: with all of them, the slowest frames took twice as long.
-fn threads_beside_a_live_chain() -> usize {
-    Machine::this().threads.saturating_sub(1).max(1)
 }
 
 /// The built-in body, or a file's.

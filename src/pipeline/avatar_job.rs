@@ -23,10 +23,21 @@ use effigy_capture::CameraModel;
 use effigy_registration::BodyModel;
 
 use super::{clock::Clock, settings::Settings};
-use crate::interrupt;
+use crate::{interrupt, machine::Machine};
 
 /// How often somebody who waits for an avatar looks up.
 const LOOK_EVERY: Duration = Duration::from_millis(100);
+
+/// What else the machine has to do meanwhile.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Beside {
+    /// A replay in lock-step, which waits for the avatar.
+    Nothing,
+    /// Frames that must not come late.
+    LiveChain,
+    /// Frames that come late anyhow.
+    OverloadedChain,
+}
 
 /// A running job; dropping it cancels it.
 pub(crate) struct AvatarJob {
@@ -57,7 +68,7 @@ impl AvatarJob {
         (keyframes, camera): (Vec<Keyframe>, CameraModel),
         body: &Arc<BodyModel>,
         settings: &Settings,
-        clock: Clock,
+        (beside, clock): (Beside, Clock),
     ) -> anyhow::Result<Self> {
         let cancel = Arc::new(AtomicBool::new(false));
         let progress = Arc::new(Mutex::new(FineTuneProgress::default()));
@@ -69,12 +80,13 @@ impl AvatarJob {
             settings: settings.clone(),
             cancel: Arc::clone(&cancel),
             progress: Arc::clone(&progress),
+            beside,
             clock,
         };
         let thread = thread::Builder::new()
             .name("fine-tune".to_owned())
             .spawn(move || {
-                lower_priority();
+                beside.take_place();
                 // Nobody listens any more after a cancellation.
                 drop(sender.send(work.run()));
             })
@@ -114,15 +126,28 @@ fn died() -> anyhow::Error {
     anyhow!("fine-tuning ended without a result; this is a defect of Effigy, please report it")
 }
 
-/// The live chain goes first; the threads that this one starts inherit its place.
-fn lower_priority() {
-    #[cfg(target_os = "linux")]
-    {
-        // A tenth of a busy core: at 15 and more an avatar never came beside a window drawn in software.
-        const NICE: i32 = 10;
-        let thread = rustix::thread::gettid();
-        if let Err(error) = rustix::process::setpriority_process(Some(thread), NICE) {
-            tracing::warn!(%error, "fine-tuning keeps the priority of everything else");
+impl Beside {
+    /// Threads of a job that was not told how many.
+    fn threads(self) -> usize {
+        let cores = Machine::this().threads;
+        match self {
+            Self::Nothing | Self::OverloadedChain => cores,
+            // With all cores, the chain's slowest frames took half as long again.
+            Self::LiveChain => cores.saturating_sub(1).max(1),
+        }
+    }
+
+    /// The live chain goes first; the threads that this one starts inherit its place.
+    fn take_place(self) {
+        // A tenth of a busy core. Where everything is busy all the time, as beside a window that is drawn in
+        // software, that would mean an avatar after five minutes.
+        #[cfg(target_os = "linux")]
+        if self == Self::LiveChain {
+            const NICE: i32 = 10;
+            let thread = rustix::thread::gettid();
+            if let Err(error) = rustix::process::setpriority_process(Some(thread), NICE) {
+                tracing::warn!(%error, "fine-tuning keeps the priority of everything else");
+            }
         }
     }
 }
@@ -134,13 +159,19 @@ struct Work {
     settings: Settings,
     cancel: Arc<AtomicBool>,
     progress: Arc<Mutex<FineTuneProgress>>,
+    beside: Beside,
     clock: Clock,
 }
 
 impl Work {
     /// All of it inside a pool of low priority: what ran in the pool that everybody shares would hold up the live stages.
     fn run(&self) -> anyhow::Result<FinishedAvatar> {
-        Threads::new(&self.settings.fine_tune.threads, lower_priority)?.run(|| self.make())
+        let mut threads = self.settings.fine_tune.threads;
+        if threads.count == 0 {
+            threads.count = self.beside.threads();
+        }
+        let beside = self.beside;
+        Threads::new(&threads, move || beside.take_place())?.run(|| self.make())
     }
 
     fn make(&self) -> anyhow::Result<FinishedAvatar> {

@@ -9,7 +9,7 @@ use effigy_capture::{CameraModel, FrameId};
 use effigy_registration::{BodyModel, RegisteredFrame};
 
 use super::{
-    avatar_job::{AvatarJob, FinishedAvatar, JobFigures},
+    avatar_job::{AvatarJob, Beside, FinishedAvatar, JobFigures},
     clock::{Clock, Timings},
     schedule::{Decision, Schedule},
     settings::Settings,
@@ -29,6 +29,8 @@ pub(crate) struct AvatarStage {
     making: Option<Making>,
     made: Option<Made>,
     gave_up: bool,
+    /// Whether the chain loses frames as it is.
+    overloaded: bool,
     /// What the user asked for since the last frame.
     requests: Vec<Decision>,
     /// All frames that any avatar learned from.
@@ -68,6 +70,7 @@ impl AvatarStage {
             making: None,
             made: None,
             gave_up: false,
+            overloaded: false,
             requests: Vec::new(),
             learned_from: BTreeSet::new(),
             figures: Vec::new(),
@@ -99,6 +102,11 @@ impl AvatarStage {
             decided.push(decision);
         }
         Ok(decided)
+    }
+
+    /// Whether the chain loses frames as it is, without any fine-tuning.
+    pub(crate) fn note_load(&mut self, overloaded: bool) {
+        self.overloaded = overloaded;
     }
 
     /// Takes effect with the next frame.
@@ -247,6 +255,14 @@ impl AvatarStage {
         }
     }
 
+    fn beside(&self) -> Beside {
+        match (&self.schedule, self.overloaded) {
+            (Schedule::AfterFrames(_) | Schedule::AsRecorded(_), _) => Beside::Nothing,
+            (Schedule::WhenReady, false) => Beside::LiveChain,
+            (Schedule::WhenReady, true) => Beside::OverloadedChain,
+        }
+    }
+
     /// Starts with the keyframes there are, if there are any.
     fn begin(&mut self) -> anyhow::Result<()> {
         if self.selector.keyframes().is_empty() {
@@ -257,7 +273,7 @@ impl AvatarStage {
             (self.selector.keyframes().to_vec(), self.camera),
             &self.body,
             &self.settings,
-            self.clock,
+            (self.beside(), self.clock),
         )?;
         self.gave_up = false;
         self.making = Some(Making { job, frames_since_begun: 0, keyframes });

@@ -1,6 +1,7 @@
 //! At the source's pace: capture, tracking and driving each on a thread, late frames dropped and counted.
 
 use std::{
+    collections::VecDeque,
     panic::resume_unwind,
     sync::{
         Arc,
@@ -200,12 +201,33 @@ fn track(
     Ok(())
 }
 
+/// How many frames were dropped by when.
+#[derive(Default)]
+struct Load {
+    dropped: VecDeque<u64>,
+}
+
+impl Load {
+    /// Whether more than a tenth of the latest frames were dropped.
+    fn is_too_high(&mut self, dropped_so_far: u64) -> bool {
+        /// About three seconds.
+        const RECENT: usize = 90;
+        self.dropped.push_back(dropped_so_far);
+        if self.dropped.len() > RECENT {
+            self.dropped.pop_front();
+        }
+        let before = self.dropped.front().copied().unwrap_or_default();
+        (dropped_so_far - before) * 10 > RECENT as u64
+    }
+}
+
 fn drive(
     tracked: &Receiver<Tracked>,
     avatar: &mut AvatarStage,
     outputs: &mut Outputs,
     (log, controls): (&mut RunLog, &Controls),
 ) -> anyhow::Result<()> {
+    let mut load = Load::default();
     loop {
         controls.obey(avatar, outputs)?;
         outputs.paused(controls.paused());
@@ -219,6 +241,7 @@ fn drive(
         log.delivered(&delivered.frame);
         log.dropped_so_far = delivered.dropped_so_far;
         log.playback = delivered.playback;
+        avatar.note_load(load.is_too_high(delivered.dropped_so_far));
         let decided = avatar.advance(registered)?;
         let mesh = avatar.drive(registered);
         let latency = log.clock.now().saturating_sub(delivered.at);
