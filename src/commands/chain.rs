@@ -86,7 +86,9 @@ fn run_chain(
     settings.keyframes.count = args.keyframes.unwrap_or(settings.keyframes.count);
     let name = input.source.name();
     let calibration = input.source.calibration().clone();
-    let mut outputs = Outputs::new(args, &calibration, input.source.frame_count(), &body)?;
+    // A window is closed when somebody closes it.
+    let frame_count = input.source.frame_count().filter(|_| window.is_none());
+    let mut outputs = Outputs::new(args, &calibration, frame_count, &body)?;
     if let Some(slot) = window {
         outputs.publish(Publisher::new(
             slot,

@@ -162,12 +162,25 @@ impl Outputs {
         let due = frame.id.0 % self.moment_every == self.moment_every / 2;
         if due && registered.params().is_some() {
             self.moments.push(RegisteredFrame::clone(registered));
+            self.thin_out_moments();
         }
         self.progress.say(avatar.status());
         self.frames += 1;
         self.progress.advance(self.frames);
         self.last = Some(Arc::clone(registered));
         Ok(())
+    }
+
+    /// Of a run without a known end: half as many, half as often, whenever there are too many.
+    fn thin_out_moments(&mut self) {
+        if self.moments.len() as u64 > 2 * MOMENTS {
+            let mut number = 0;
+            self.moments.retain(|_| {
+                number += 1;
+                number % 2 == 1
+            });
+            self.moment_every *= 2;
+        }
     }
 
     /// Waits for the avatar that is still being made when the source has ended, and shows it.

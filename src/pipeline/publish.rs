@@ -140,6 +140,11 @@ impl Publisher {
         let view = &mut self.training;
         if let Some(now) = avatar.progress() {
             let step = f64::from(now.step);
+            if now.step < view.step {
+                // Another avatar, another curve.
+                view.loss.clear();
+                view.held_out_mm.clear();
+            }
             if now.step > view.step {
                 view.loss.push([step, now.loss.total()]);
                 view.held_out_mm
