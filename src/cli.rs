@@ -79,12 +79,22 @@ pub(crate) struct SceneArgs {
     /// The simulated sensor: azure, d435, oak, kinect
     #[arg(long, default_value = "azure", value_parser = named::<SensorPreset>)]
     pub(crate) sensor: SensorPreset,
-    /// What the person does: mixture, turn-around, walk-in-place, raise-arms, squat, wave, stand, or a .bvh file
+    /// What the person does: mixture, turn-around, walk-in-place, raise-arms, squat, wave, stand, twist, punch, shoulder-mill, hips,
+    /// soccer-kick, ballerina-spin, walk, reach, sit-down, bend, chicken-wings, flying-eagle, or a file: .bvh, .amc,
+    /// SMPL's .npz or .csv
     #[arg(long, default_value = "mixture", value_parser = motion)]
     pub(crate) motion: MotionChoice,
-    /// What the person wears: demo, close-fitting, loose, sport, random, bare
+    /// What the person wears: demo, close-fitting, loose, sport, random, bare; or simulated cloth: tshirt-trousers,
+    /// tshirt-shorts, longsleeve-trousers, longsleeve-wide-trousers, polo-trousers, hoodie-trousers, blazer-trousers,
+    /// skirt, dress
     #[arg(long, default_value = "demo", value_parser = named::<OutfitKind>)]
     pub(crate) outfit: OutfitKind,
+    /// A skinned glTF character (.glb, .gltf) instead of our own people; `--outfit` is the character's then
+    #[arg(long, value_name = "FILE")]
+    pub(crate) character: Option<PathBuf>,
+    /// One of the character's own movements, by name, instead of `--motion`
+    #[arg(long, value_name = "NAME", requires = "character")]
+    pub(crate) clip: Option<String>,
     /// Who the person is, and what the sensor gets wrong
     #[arg(long, default_value_t = 1)]
     pub(crate) seed: u64,
@@ -93,10 +103,14 @@ pub(crate) struct SceneArgs {
     pub(crate) seconds: Option<f32>,
 }
 
-/// A name as in files, with dashes or underscores.
+/// A name as in files; dashes and underscores are the same.
 fn named<T: DeserializeOwned>(text: &str) -> Result<T, value::Error> {
-    T::deserialize(text.replace('-', "_").into_deserializer())
+    let as_typed = T::deserialize(text.into_deserializer());
+    as_typed.or_else(|_: value::Error| T::deserialize(text.replace('-', "_").into_deserializer()))
 }
+
+/// Endings of motion files.
+const MOTION_FILES: [&str; 4] = ["bvh", "amc", "npz", "csv"];
 
 fn keyframe_count(text: &str) -> Result<usize, String> {
     let count: usize = text.parse().map_err(|error| format!("{error}"))?;
@@ -108,9 +122,11 @@ fn keyframe_count(text: &str) -> Result<usize, String> {
 }
 
 fn motion(text: &str) -> Result<MotionChoice, value::Error> {
-    let is_file = text.to_ascii_lowercase().ends_with(".bvh");
-    if is_file {
-        return Ok(MotionChoice::Bvh(PathBuf::from(text)));
+    let ending = text
+        .rsplit_once('.')
+        .map(|(_, ending)| ending.to_ascii_lowercase());
+    if ending.is_some_and(|ending| MOTION_FILES.contains(&ending.as_str())) {
+        return Ok(MotionChoice::File(PathBuf::from(text)));
     }
     named::<Routine>(text).map(MotionChoice::Routine)
 }
@@ -206,7 +222,7 @@ pub(crate) struct InfoArgs {
 pub(crate) struct ExportArgs {
     /// The avatar file
     pub(crate) avatar: PathBuf,
-    /// A BVH file to play
+    /// A motion file to play: .bvh, .amc, SMPL's .npz or .csv
     #[arg(long)]
     pub(crate) motion: Option<PathBuf>,
     /// The binary glTF file to write

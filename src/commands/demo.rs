@@ -20,10 +20,12 @@ pub(crate) fn run(args: &DemoArgs) -> anyhow::Result<()> {
         let seconds = if windowed { UNTIL_CLOSED_SECS } else { SECONDS };
         let scenario = scenario(&args.scene, seconds)?;
         let sensor = SimulatedSensor::new(&scenario, builtin::body())?;
-        let truth = Truth::new(&scenario, builtin::body())?;
+        // Of a character from elsewhere, nobody knows the true body.
+        let has_true_body = scenario.stranger.is_none();
+        let truth = has_true_body.then(|| Truth::new(&scenario, builtin::body()));
         Ok(Input {
             source: Box::new(sensor),
-            truth: Some(truth),
+            truth: truth.transpose()?,
             pace: Pace::LockStep,
             metadata: BTreeMap::from([(SCENARIO_KEY.to_owned(), scenario.to_json())]),
             decided: None,

@@ -4,7 +4,7 @@ use effigy_avatar::{
     Avatar,
     export::{GlbOptions, write_glb},
 };
-use effigy_registration::motion::{Motion, RestBody};
+use effigy_registration::motion::{self, RestBody};
 
 use super::chain::body_model;
 use crate::cli::ExportArgs;
@@ -13,7 +13,7 @@ pub(crate) fn run(args: &ExportArgs) -> anyhow::Result<()> {
     let body = body_model(args.body.as_deref())?;
     let avatar = Avatar::load(&args.avatar, body.identity)?;
     let motion = match &args.motion {
-        Some(path) => Some(Motion::from_bvh(
+        Some(path) => Some(motion::open(
             path,
             &RestBody::of(&body, &avatar.subject.betas),
         )?),

@@ -65,11 +65,16 @@ fn open(args: &ReplayArgs) -> anyhow::Result<Input> {
 
 /// What the simulator left there, if it can be made again here.
 fn truth_of(scenario: &str) -> Option<Truth> {
-    let truth =
-        Scenario::from_json(scenario).and_then(|scenario| Truth::new(&scenario, builtin::body()));
+    let truth = Scenario::from_json(scenario).and_then(|scenario| {
+        // Of a character from elsewhere, nobody knows the true body.
+        let has_true_body = scenario.stranger.is_none();
+        let truth = has_true_body.then(|| Truth::new(&scenario, builtin::body()));
+        truth.transpose()
+    });
     truth
         .inspect_err(|error| eprintln!("effigy: nothing is compared with the truth: {error}"))
         .ok()
+        .flatten()
 }
 
 fn is_same_file(a: &Path, b: &Path) -> bool {

@@ -1,6 +1,6 @@
 //! From what was typed about a simulated scene to the scene.
 
-use effigy_sim_sensor::Scenario;
+use effigy_sim_sensor::{Scenario, stranger::StrangerChoice};
 
 use crate::cli::SceneArgs;
 
@@ -14,6 +14,11 @@ pub(crate) fn scenario(args: &SceneArgs, seconds: f32) -> anyhow::Result<Scenari
         sensor: args.sensor,
         motion: args.motion.clone(),
         outfit: args.outfit,
+        stranger: args.character.clone().map(|path| StrangerChoice {
+            path,
+            clip: args.clip.clone(),
+            height_m: None,
+        }),
         seconds: args.seconds.unwrap_or(seconds),
         ..Scenario::default()
     };
