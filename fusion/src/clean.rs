@@ -96,6 +96,16 @@ pub struct Cleaner {
     bodies: Vec<Body>,
     scratch_depth: Vec<f32>,
     scratch_normals: Vec<Vec3>,
+    spare: Option<Spare>,
+}
+
+/// The memory of a frame that nobody needs any more; without a measurement but for the depth.
+#[derive(Clone, Debug)]
+struct Spare {
+    depth: Vec<f32>,
+    points: Vec<Vec3>,
+    normals: Vec<Vec3>,
+    sigma_m: Vec<f32>,
 }
 
 impl Cleaner {
@@ -109,6 +119,7 @@ impl Cleaner {
             bodies: Vec::new(),
             scratch_depth: Vec::new(),
             scratch_normals: Vec::new(),
+            spare: None,
             rays,
             calibration,
             config,
@@ -120,14 +131,15 @@ impl Cleaner {
         self.check_size(frame)?;
         let range_m = self.config.range_m.unwrap_or(self.calibration.range_m);
         let scale = self.calibration.metres_per_unit;
-        let mut depth = DepthMap::in_metres(&frame.depth, scale, range_m);
+        let Spare { depth, points, normals, sigma_m } = self.spare();
+        let mut depth = DepthMap::in_metres_into(depth, &frame.depth, scale, range_m);
         let Segmentation { mut person, region, floor, visibility, bodies } =
             self.segmenter.segment(&depth, &self.rays, &self.tolerance);
         self.bodies = bodies;
         let filled = self.clean_person(&mut depth, &mut person, &region);
-        let vertices = self.unproject_person(&depth, &person, &region);
-        let normals = NormalMap::within(&vertices, &region, &mut self.scratch_normals);
-        let sigma_m = self.sigma(&vertices, &normals, &region, &filled);
+        let vertices = self.unproject_person(points, &depth, &person, &region);
+        let normals = NormalMap::within(normals, &vertices, &region, &mut self.scratch_normals);
+        let sigma_m = self.sigma(sigma_m, (&vertices, &normals), &region, &filled);
         let (id, timestamp) = (frame.id, frame.timestamp);
         Ok(CleanFrame {
             id,
@@ -139,6 +151,38 @@ impl Cleaner {
             sigma_m,
             floor,
             visibility,
+        })
+    }
+
+    /// Takes a frame back, as [`Self::process`] made it: its memory serves the next one, which spares the system
+    /// some ten megabytes of fresh pages a frame.
+    pub fn recycle(&mut self, frame: CleanFrame) {
+        let CleanFrame { depth, vertices, normals, person, mut sigma_m, .. } = frame;
+        let (mut points, mut normals) = (vertices.points, normals.normals);
+        let width = depth.width.max(1);
+        for (row, person) in person.chunks_exact(width).enumerate() {
+            let Some(first) = person.iter().position(|&person| person) else {
+                continue;
+            };
+            let last = person.iter().rposition(|&person| person).unwrap_or(first);
+            let touched = row * width + first..=row * width + last;
+            points[touched.clone()].fill(Vec3::NAN);
+            normals[touched.clone()].fill(Vec3::NAN);
+            sigma_m[touched].fill(f32::NAN);
+        }
+        self.spare = Some(Spare { depth: depth.metres, points, normals, sigma_m });
+    }
+
+    /// Memory for a frame of this source.
+    fn spare(&mut self) -> Spare {
+        let camera = &self.calibration.depth.intrinsics;
+        let count = camera.pixel_count();
+        let fits = |spare: &Spare| spare.points.len() == count && spare.sigma_m.len() == count;
+        self.spare.take().filter(fits).unwrap_or_else(|| Spare {
+            depth: Vec::new(),
+            points: vec![Vec3::NAN; count],
+            normals: vec![Vec3::NAN; count],
+            sigma_m: vec![f32::NAN; count],
         })
     }
 
@@ -190,8 +234,14 @@ impl Cleaner {
         filled
     }
 
-    fn unproject_person(&self, depth: &DepthMap, person: &[bool], region: &Region) -> VertexMap {
-        let mut vertices = VertexMap::empty(depth.width, depth.height);
+    fn unproject_person(
+        &self,
+        points: Vec<Vec3>,
+        depth: &DepthMap,
+        person: &[bool],
+        region: &Region,
+    ) -> VertexMap {
+        let mut vertices = VertexMap { width: depth.width, height: depth.height, points };
         for y in region.rows.clone() {
             let row = y * depth.width;
             let columns = row + region.columns.start..row + region.columns.end;
@@ -205,13 +255,12 @@ impl Cleaner {
     /// The sensor's noise at each of the person's pixels, by depth and by angle of incidence.
     fn sigma(
         &self,
-        vertices: &VertexMap,
-        normals: &NormalMap,
+        mut sigma_m: Vec<f32>,
+        (vertices, normals): (&VertexMap, &NormalMap),
         region: &Region,
         filled: &[Filled],
     ) -> Vec<f32> {
         let width = vertices.width;
-        let mut sigma_m = vec![f32::NAN; vertices.points.len()];
         let rows = region.rows.start * width..region.rows.end * width;
         sigma_m[rows]
             .par_chunks_mut(width)

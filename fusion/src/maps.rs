@@ -86,16 +86,28 @@ impl Rays {
 impl DepthMap {
     /// Raw depth in metres; NaN where there is none, or where it lies outside `range_m`.
     pub fn in_metres(image: &DepthImage, metres_per_unit: f32, range_m: [f32; 2]) -> Self {
+        Self::in_metres_into(Vec::new(), image, metres_per_unit, range_m)
+    }
+
+    /// As [`Self::in_metres`], in memory that may have served before.
+    #[expect(
+        clippy::needless_bitwise_bool,
+        reason = "without shortcuts several pixels are converted at a time"
+    )]
+    pub(crate) fn in_metres_into(
+        mut metres: Vec<f32>,
+        image: &DepthImage,
+        metres_per_unit: f32,
+        range_m: [f32; 2],
+    ) -> Self {
         let convert = |&raw: &u16| {
             let depth_m = f32::from(raw) * metres_per_unit;
-            let usable = raw != 0 && depth_m >= range_m[0] && depth_m <= range_m[1];
+            let usable = (raw != 0) & (depth_m >= range_m[0]) & (depth_m <= range_m[1]);
             if usable { depth_m } else { f32::NAN }
         };
-        Self {
-            width: image.width() as usize,
-            height: image.height() as usize,
-            metres: image.pixels().iter().map(convert).collect(),
-        }
+        metres.clear();
+        metres.extend(image.pixels().iter().map(convert));
+        Self { width: image.width() as usize, height: image.height() as usize, metres }
     }
 
     /// A map without any measurement.
@@ -139,13 +151,19 @@ impl NormalMap {
     /// not bridged. NaN where there is no point, or where it has no neighbours.
     pub fn from_vertices(vertices: &VertexMap) -> Self {
         let whole = Region::whole(vertices.width, vertices.height);
-        Self::within(vertices, &whole, &mut Vec::new())
+        let normals = vec![Vec3::NAN; vertices.points.len()];
+        Self::within(normals, vertices, &whole, &mut Vec::new())
     }
 
-    /// As [`Self::from_vertices`] within a region; `rough` is working memory.
-    pub(crate) fn within(vertices: &VertexMap, region: &Region, rough: &mut Vec<Vec3>) -> Self {
+    /// As [`Self::from_vertices`] within a region; `normals` are NaN as yet, `rough` is working memory.
+    pub(crate) fn within(
+        normals: Vec<Vec3>,
+        vertices: &VertexMap,
+        region: &Region,
+        rough: &mut Vec<Vec3>,
+    ) -> Self {
         let (width, height) = (vertices.width, vertices.height);
-        let mut map = Self { width, height, normals: vec![Vec3::NAN; width * height] };
+        let mut map = Self { width, height, normals };
         if region.is_empty() {
             return map;
         }

@@ -11,8 +11,8 @@ use crate::{
     observe::{DataPoint, Observation},
     prior::surprise,
     residual::{
-        ClothSide, DepthPush, FloorTerm, JointLimits, Match, PointToPlane, PosePrior, Silhouette,
-        Temporal, Term,
+        ClothSide, DepthPush, FloorTerm, JointLimits, Match, PointToPlane, PosePrior, Prediction,
+        Silhouette, Standing, Temporal, Term, sole_of_lower_foot,
     },
     smpl::JOINT_COUNT,
     solve::{Damping, Termination, take_step},
@@ -54,10 +54,15 @@ pub struct EnergyConfig {
     pub silhouette_slack_m: f32,
     pub pose_prior_weight: f32,
     pub temporal_weight: f32,
+    /// Depth noise that doubles the weight for a joint at rest: the noisier a frame, the less it tells of its own.
+    pub still_noise_m: f32,
     /// A joint's turn against the prediction that costs one.
     pub temporal_rotation_rad: f32,
     pub temporal_trans_m: f32,
     pub floor_m: f32,
+    /// What the lower foot's standing on the floor is worth, and how exactly it does.
+    pub standing_weight: f32,
+    pub standing_m: f32,
     pub joint_limit_rad: f32,
 }
 
@@ -66,8 +71,8 @@ impl Default for EnergyConfig {
         Self {
             data_weight: 400.0,
             cloth_standoff_m: 0.010,
-            hair_m: 0.0,
-            sole_m: 0.0,
+            hair_m: 0.008,
+            sole_m: 0.012,
             cloth_outside_m: 0.020,
             cloth_inside_m: 0.008,
             outlier_m: 0.08,
@@ -79,9 +84,12 @@ impl Default for EnergyConfig {
             silhouette_slack_m: 0.012,
             pose_prior_weight: 0.5,
             temporal_weight: 1.0,
+            still_noise_m: 0.0055,
             temporal_rotation_rad: 0.12,
             temporal_trans_m: 0.02,
             floor_m: 0.01,
+            standing_weight: 1.0,
+            standing_m: 0.01,
             joint_limit_rad: 0.05,
         }
     }
@@ -91,7 +99,7 @@ impl Default for EnergyConfig {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Context<'a> {
     pub(crate) energy: &'a EnergyConfig,
-    pub(crate) predicted: Option<&'a BodyState>,
+    pub(crate) predicted: Option<&'a Prediction>,
     pub(crate) grounded: bool,
     /// Whether all of the body should be in the mask: not where it is cut off.
     pub(crate) whole: bool,
@@ -152,6 +160,7 @@ pub(crate) struct Evidence {
     matcher: Matcher,
     contradictions: Contradictions,
     floor_vertices: Vec<u32>,
+    soles: Vec<u32>,
     point_count: usize,
     widen: f32,
 }
@@ -234,6 +243,9 @@ impl Evidence {
         if self.floor_vertices.is_empty() && context.grounded {
             self.floor_vertices = foot_vertices(&body.shaped.surface);
         }
+        if context.grounded {
+            sole_of_lower_foot(body, &self.floor_vertices, &mut self.soles);
+        }
     }
 
     /// Hands all terms over what was gathered to `use_terms`.
@@ -280,6 +292,13 @@ impl Evidence {
             sigma_m: energy.floor_m,
             weight: 0.05,
         };
+        let standing = Standing {
+            vertices: &self.soles,
+            sole_m: energy.sole_m,
+            sigma_m: energy.standing_m,
+            outlier_m: 0.04,
+            weight: energy.standing_weight,
+        };
         let prior = PosePrior { weight: energy.pose_prior_weight };
         let limits = JointLimits { sigma_rad: energy.joint_limit_rad };
         let temporal = context.predicted.map(|predicted| Temporal {
@@ -287,6 +306,8 @@ impl Evidence {
             rotation_sigma_rad: energy.temporal_rotation_rad,
             trans_sigma_m: energy.temporal_trans_m,
             weight: energy.temporal_weight,
+            still_weight: energy.temporal_weight
+                * (observation.view.noise_m / energy.still_noise_m).powi(2),
         });
         let mut terms: Vec<&dyn Term> = vec![&data, &push, &prior, &limits];
         if context.whole {
@@ -294,6 +315,7 @@ impl Evidence {
         }
         if context.grounded {
             terms.push(&floor);
+            terms.push(&standing);
         }
         if let Some(temporal) = &temporal {
             terms.push(temporal);

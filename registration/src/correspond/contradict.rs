@@ -18,6 +18,8 @@ pub(crate) struct Contradictions {
 const OCCLUDER_M: f32 = 0.10;
 /// Smaller steps in front of the depth are left to the matches.
 const PUSH_FROM_M: f32 = 0.02;
+/// And so is what may be noise: it would push the body away from the camera, and nothing would push it back.
+const PUSH_SIGMAS: f32 = 2.5;
 
 /// Collects what contradicts the view; `slack_cells` is how far outside the mask a vertex may be.
 pub(crate) fn contradictions(
@@ -29,6 +31,8 @@ pub(crate) fn contradictions(
 ) {
     found.pulls.clear();
     found.pushes.clear();
+    let push_from_m = PUSH_FROM_M.hypot(PUSH_SIGMAS * view.noise_m);
+    let noise_m = push_from_m - PUSH_FROM_M;
     let rotation = view.camera_from_world.rotation_matrix();
     let translation = view.camera_from_world.translation;
     for (vertex, position) in (0_u32..).zip(&body.vertices) {
@@ -41,12 +45,13 @@ pub(crate) fn contradictions(
             .map(|cell| view.cells[cell])
             .unwrap_or_default();
         if cell.seen == Seen::Person {
-            if visibility.is_visible(vertex) && cell.depth_m - in_camera.z > PUSH_FROM_M {
-                found.pushes.push(Push { vertex, depth_m: cell.depth_m });
+            if visibility.is_visible(vertex) && cell.depth_m - in_camera.z > push_from_m {
+                let depth_m = cell.depth_m - noise_m;
+                found.pushes.push(Push { vertex, depth_m });
             }
             continue;
         }
-        if cell.seen == Seen::Gap {
+        if cell.seen == Seen::Gap || position.y < view.ground_m {
             continue;
         }
         if cell.seen == Seen::Other && cell.depth_m < in_camera.z - OCCLUDER_M {

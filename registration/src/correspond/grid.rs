@@ -85,14 +85,19 @@ impl OrientedGrid {
             if at_least_m * at_least_m >= best.1 {
                 break;
             }
-            self.for_each_in_ring(home, ring, |entry| {
-                let facing = entry.normal.dot(normal);
-                if facing <= oblique {
+            self.for_each_cell_in_ring(home, ring, |at, cell| {
+                if self.squared_distance_to_cell(position, at) >= best.1 {
                     return;
                 }
-                let measure = config.measure(entry.position - position, facing);
-                if measure < best.1 {
-                    best = (entry.index, measure);
+                for entry in self.entries_of(cell) {
+                    let facing = entry.normal.dot(normal);
+                    if facing <= oblique {
+                        continue;
+                    }
+                    let measure = config.measure(entry.position - position, facing);
+                    if measure < best.1 {
+                        best = (entry.index, measure);
+                    }
                 }
             });
         }
@@ -135,8 +140,22 @@ impl OrientedGrid {
         ((at.z * self.size.y + at.y) * self.size.x + at.x) as usize
     }
 
-    /// Visits the points of the cells at Chebyshev distance `ring` from `home`.
-    fn for_each_in_ring(&self, home: IVec3, ring: i32, mut visit: impl FnMut(&Entry)) {
+    fn entries_of(&self, cell: usize) -> &[Entry] {
+        &self.entries[self.starts[cell] as usize..self.starts[cell + 1] as usize]
+    }
+
+    /// Nothing in the cell is nearer than this; a hair less, because cells were chosen with rounding.
+    fn squared_distance_to_cell(&self, position: Vec3, at: IVec3) -> f32 {
+        const ROUNDING: f32 = 0.999;
+        let low = self.origin + at.as_vec3() * self.cell_m;
+        let beyond = (low - position)
+            .max(position - low - self.cell_m)
+            .max(Vec3::ZERO);
+        beyond.length_squared() * ROUNDING
+    }
+
+    /// Visits the cells at Chebyshev distance `ring` from `home`.
+    fn for_each_cell_in_ring(&self, home: IVec3, ring: i32, mut visit: impl FnMut(IVec3, usize)) {
         let low = (home - ring).max(IVec3::ZERO);
         let high = (home + ring).min(self.size - 1);
         for z in low.z..=high.z {
@@ -149,9 +168,8 @@ impl OrientedGrid {
                         x = (home.x + ring).max(x + 1);
                         continue;
                     }
-                    let cell = self.cell_index(IVec3::new(x, y, z));
-                    let range = self.starts[cell] as usize..self.starts[cell + 1] as usize;
-                    self.entries[range].iter().for_each(&mut visit);
+                    let at = IVec3::new(x, y, z);
+                    visit(at, self.cell_index(at));
                     x += 1;
                 }
             }

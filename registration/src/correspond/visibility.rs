@@ -91,8 +91,13 @@ impl Renderer {
     pub(crate) fn agreement(&mut self, body: &PosedSurface<'_>, view: &View) -> Agreement {
         self.draw(body, view);
         let mut tally = Tally::default();
-        for (cell, &drawn_m) in view.cells.iter().zip(&self.rasterizer.raster().depth) {
-            tally.add(cell.seen, cell.depth_m, drawn_m);
+        let drawn = &self.rasterizer.raster().depth;
+        for (i, (cell, &drawn_m)) in view.cells.iter().zip(drawn).enumerate() {
+            let lost =
+                cell.seen != Seen::Person && drawn_m > 0.0 && view.is_lost_in_floor(i, drawn_m);
+            if !lost {
+                tally.add(cell.seen, cell.depth_m, drawn_m);
+            }
         }
         tally.agreement()
     }

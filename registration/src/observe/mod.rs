@@ -58,7 +58,12 @@ impl Observation {
         };
         let points = sample(clean, world_from_camera, person_px, &sampling);
         let extent = Extent::of(&points)?;
-        let view = View::new(clean, camera, world_from_camera, config.cell_m)?;
+        let mut view = View::new(clean, camera, world_from_camera, config.cell_m)?;
+        view.noise_m = noise_m(&points);
+        if let Some(floor) = clean.floor {
+            let depth_m = (view.camera_from_world * extent.center).z;
+            view.ground_m = ground_m(view.noise_m, floor.offset_m.abs() / depth_m.max(0.5));
+        }
         Some(Self { points, view, extent })
     }
 
@@ -71,6 +76,22 @@ impl Observation {
         self.extent.center = new_from_old * self.extent.center;
         self.view.camera_from_world = self.view.camera_from_world * new_from_old.inverse();
     }
+}
+
+/// Standard deviation of what is seen face on: most of a body is seen at an angle, so it is among the smallest.
+fn noise_m(points: &[DataPoint]) -> f32 {
+    let mut sigmas: Vec<f32> = points.iter().map(|point| point.sigma_m).collect();
+    let rank = sigmas.len() / 10;
+    *sigmas.select_nth_unstable_by(rank, f32::total_cmp).1
+}
+
+/// Up to where cleaning takes depth for the floor: a skin, and three standard deviations of the depth as they show
+/// across a floor that falls away by `slope`.
+fn ground_m(noise_m: f32, slope: f32) -> f32 {
+    const SKIN_M: f32 = 0.02;
+    /// Cells are coarser than pixels.
+    const CELL_M: f32 = 0.01;
+    SKIN_M + CELL_M + 3.0 * noise_m * slope
 }
 
 impl Extent {

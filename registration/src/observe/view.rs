@@ -18,6 +18,10 @@ pub(crate) struct View {
     nearest_person: Vec<[i16; 2]>,
     /// Where the sensor's image ends within the view: `[left, top, right, bottom]`, half-open.
     image: [i32; 4],
+    /// In the world: what is lower cannot be told from the floor by its depth, so it may be missing from the mask.
+    pub(crate) ground_m: f32,
+    /// Standard deviation of a depth seen face on.
+    pub(crate) noise_m: f32,
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -54,7 +58,7 @@ impl View {
     ) -> Option<Self> {
         let person = PersonBox::of(clean, &camera.intrinsics)?;
         let full = &camera.intrinsics;
-        let scale = (cell_m * full.fx / person.depth_m).floor().clamp(1.0, 16.0);
+        let scale = (cell_m * full.fx / person.depth_m).round().clamp(1.0, 16.0);
         let margin_px = MARGIN_M * full.fx / person.depth_m;
         let [left, top] = (person.min - margin_px)
             .to_array()
@@ -82,6 +86,8 @@ impl View {
             cells: vec![Cell::default(); pinhole.pixel_count()],
             nearest_person: Vec::new(),
             image,
+            ground_m: f32::MIN,
+            noise_m: 0.0,
         };
         view.fill(clean, person.pixels_with_margin(clean, margin_px), scale);
         let inside: Vec<bool> = view.cells.iter().map(|c| c.seen == Seen::Person).collect();
@@ -117,23 +123,44 @@ impl View {
         Some(Vec2::new(f32::from(x), f32::from(y)))
     }
 
+    /// Whether a point on a cell's ray is so low that the sensor would take it for the floor.
+    pub(crate) fn is_lost_in_floor(&self, cell: usize, depth_m: f32) -> bool {
+        if self.ground_m == f32::MIN {
+            return false;
+        }
+        let width = self.pinhole.width as usize;
+        let place = Vec2::new((cell % width) as f32, (cell / width) as f32);
+        let in_camera = self.pinhole.unproject(place, depth_m);
+        // The world's y axis in the camera's space: no need to invert the whole transform.
+        let up = self.camera_from_world.rotation * Vec3::Y;
+        up.dot(in_camera - self.camera_from_world.translation) < self.ground_m
+    }
+
     pub(crate) fn metres_per_cell(&self, depth_m: f32) -> f32 {
         depth_m / self.pinhole.fx
     }
 
     fn fill(&mut self, clean: &CleanFrame, pixels: [usize; 4], scale: f32) {
-        // Every other pixel still fills cells four pixels wide.
-        let step = if scale >= 4.0 { 2 } else { 1 };
+        // Every other pixel still fills cells four pixels wide, and surroundings half as wide.
+        let person_step = if scale >= 4.0 { 2 } else { 1 };
+        let other_step = if scale >= 2.0 { 2 } else { 1 };
         let [left, top, right, bottom] = pixels;
-        for y in (top..bottom).step_by(step) {
-            for x in (left..right).step_by(step) {
+        for y in (top..bottom).step_by(person_step) {
+            for x in (left..right).step_by(person_step) {
                 let i = y * clean.vertices.width + x;
                 if clean.person[i] {
                     let point = clean.vertices.points[i];
                     if let Some(cell) = self.cell_of(point) {
                         self.cells[cell].add(Seen::Person, point.z);
                     }
-                } else if clean.depth.metres[i] > 0.05
+                }
+            }
+        }
+        for y in (top..bottom).step_by(other_step) {
+            for x in (left..right).step_by(other_step) {
+                let i = y * clean.vertices.width + x;
+                if !clean.person[i]
+                    && clean.depth.metres[i] > 0.05
                     && let Some(cell) = self.cell_of_pixel(x, y, scale)
                 {
                     // Surroundings only matter where they hide the person: a lens' distortion does not.
@@ -182,6 +209,8 @@ impl View {
             cells: vec![Cell::default(); pinhole.pixel_count()],
             nearest_person: vec![[0, 0]; pinhole.pixel_count()],
             image: [0, 0, 320, 288],
+            ground_m: f32::MIN,
+            noise_m: 0.0,
         }
     }
 }
@@ -210,6 +239,8 @@ struct PersonBox {
 
 impl PersonBox {
     fn of(clean: &CleanFrame, camera: &Intrinsics) -> Option<Self> {
+        /// Looking at every other pixel misses less than the margin around the box has room for.
+        const STEP: usize = 2;
         let mut found = Self {
             min: Vec2::MAX,
             max: Vec2::MIN,
@@ -218,8 +249,8 @@ impl PersonBox {
         };
         let mut count = 0;
         let width = clean.vertices.width;
-        for (y, row) in clean.person.chunks_exact(width).enumerate() {
-            for x in (0..width).filter(|&x| row[x]) {
+        for (y, row) in clean.person.chunks_exact(width).enumerate().step_by(STEP) {
+            for x in (0..width).step_by(STEP).filter(|&x| row[x]) {
                 let point = clean.vertices.points[y * width + x];
                 if !point.is_finite() || point.z <= 0.05 {
                     continue;

@@ -9,7 +9,7 @@ use crate::surface::PosedSurface;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Push {
     pub(crate) vertex: u32,
-    /// The observed depth there, in metres along the camera's axis.
+    /// The observed depth there less what may be noise, in metres along the camera's axis.
     pub(crate) depth_m: f32,
 }
 

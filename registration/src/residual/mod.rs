@@ -12,6 +12,7 @@ mod pose_prior;
 mod row;
 mod shape_prior;
 mod silhouette;
+mod standing;
 mod temporal;
 
 pub(crate) use depth_push::{DepthPush, Push};
@@ -20,10 +21,11 @@ pub(crate) use inside_cloth::ClothSide;
 pub(crate) use joint_limits::JointLimits;
 pub(crate) use point_to_plane::{Match, PointToPlane};
 pub(crate) use pose_prior::PosePrior;
-pub(crate) use row::{CostSum, Row, RowSink};
+pub(crate) use row::{BLOCKS, CostSum, Row, RowSink};
 pub(crate) use shape_prior::ShapePrior;
 pub(crate) use silhouette::{Pull, Silhouette};
-pub(crate) use temporal::Temporal;
+pub(crate) use standing::{Standing, sole_of_lower_foot};
+pub(crate) use temporal::{Prediction, Temporal};
 
 use crate::surface::PosedSurface;
 

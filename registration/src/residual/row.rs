@@ -4,7 +4,8 @@ use glam::Vec3;
 
 use crate::state::{ALL_UNKNOWNS, BETA_COUNT, FIRST_BETA};
 
-const BLOCKS: usize = FIRST_BETA / 3;
+/// Threes of unknowns: `trans` and each joint.
+pub(crate) const BLOCKS: usize = FIRST_BETA / 3;
 
 /// A residual, its weight, and its derivative by `trans`, the joints that move it, and maybe the betas.
 #[derive(Clone, Debug)]
@@ -67,6 +68,28 @@ impl Row {
         for (sum, d) in betas.iter_mut().zip(derivative) {
             *sum += d;
         }
+    }
+
+    pub(crate) fn has_betas(&self) -> bool {
+        self.betas.is_some()
+    }
+
+    /// Writes where each block that is not zero starts (ascending), and its derivative; returns how many.
+    pub(crate) fn blocks(
+        &self,
+        starts: &mut [usize; BLOCKS],
+        values: &mut [[f64; 3]; BLOCKS],
+    ) -> usize {
+        let mut count = 0;
+        let mut used = self.used;
+        while used != 0 {
+            let block = used.trailing_zeros() as usize;
+            used &= used - 1;
+            starts[count] = 3 * block;
+            values[count] = self.blocks[block].as_dvec3().to_array();
+            count += 1;
+        }
+        count
     }
 
     /// Writes indices (ascending) and values of the derivative; returns how many.

@@ -3,7 +3,7 @@
 use faer::{Mat, Side, linalg::solvers::Solve as _};
 
 use crate::{
-    residual::{Row, RowSink},
+    residual::{BLOCKS, Row, RowSink},
     state::ALL_UNKNOWNS,
 };
 
@@ -159,6 +159,18 @@ impl RowSink for NormalEquations {
     }
 
     fn take(&mut self, row: &Row) {
+        if row.has_betas() {
+            self.take_entries(row);
+        } else {
+            self.take_blocks(row);
+        }
+        self.cost += f64::from(row.cost);
+    }
+}
+
+impl NormalEquations {
+    /// Any row, entry by entry.
+    fn take_entries(&mut self, row: &Row) {
         let (mut indices, mut values) = ([0; ALL_UNKNOWNS], [0.0; ALL_UNKNOWNS]);
         let mut count = row.sparse(&mut indices, &mut values);
         while count > 0 && indices[count - 1] >= self.unknowns {
@@ -174,7 +186,28 @@ impl RowSink for NormalEquations {
                 line[indices[b]] += weighted * values[b];
             }
         }
-        self.cost += f64::from(row.cost);
+    }
+
+    /// A row without betas, three unknowns at a time: the same sums, faster. Diagonal blocks fill both triangles.
+    fn take_blocks(&mut self, row: &Row) {
+        let (mut starts, mut values) = ([0; BLOCKS], [[0.0; 3]; BLOCKS]);
+        let count = row.blocks(&mut starts, &mut values);
+        let weight = f64::from(row.weight);
+        let residual = f64::from(row.residual);
+        for a in 0..count {
+            let weighted = values[a].map(|value| value * weight);
+            for (axis, weighted) in weighted.into_iter().enumerate() {
+                let index = starts[a] + axis;
+                self.gradient[index] += weighted * residual;
+                let line = &mut self.hessian[index * self.unknowns..][..self.unknowns];
+                for (start, [x, y, z]) in starts.iter().zip(&values).take(a + 1) {
+                    let three = &mut line[*start..*start + 3];
+                    three[0] += weighted * x;
+                    three[1] += weighted * y;
+                    three[2] += weighted * z;
+                }
+            }
+        }
     }
 }
 

@@ -4,6 +4,7 @@ use glam::{Quat, Vec3};
 
 use crate::{
     align::Aligned,
+    residual::Prediction,
     smpl::JOINT_COUNT,
     state::{BodyState, axis_angle},
 };
@@ -23,6 +24,9 @@ pub(super) struct Body {
 pub(super) struct Velocity {
     moving: Vec3,
     turning: [Vec3; JOINT_COUNT],
+    /// The highest speeds of late, fading: a swinging arm stops at each end, but does not hold still.
+    lately_moving: f32,
+    lately_turning: [f32; JOINT_COUNT],
 }
 
 impl Body {
@@ -36,11 +40,14 @@ impl Body {
     }
 
     /// Moves on as before: wholly for what was seen, less for what was not.
-    pub(super) fn predict(&self, step_secs: f32) -> BodyState {
+    pub(super) fn predict(&self, step_secs: f32) -> Prediction {
         /// Accelerations are common; a velocity carried on in full overshoots.
         const CARRY: f32 = 0.8;
         /// A quick wave; faster is an error that must not feed itself.
         const FASTEST_RAD_PER_SEC: f32 = 8.0;
+        /// Whoever moves like this does not hold still.
+        const BRISK_RAD_PER_SEC: f32 = 1.0;
+        const BRISK_METRES_PER_SEC: f32 = 0.25;
         /// After a longer gap the velocity is another one.
         const LONGEST_SECS: f32 = 0.07;
         let carry_secs = CARRY * step_secs.min(LONGEST_SECS);
@@ -52,7 +59,13 @@ impl Body {
             predicted.rotations[joint] =
                 (Quat::from_scaled_axis(turn) * self.state.rotations[joint]).normalize();
         }
-        predicted
+        let stillness = |speed: f32, brisk: f32| (-(speed / brisk).powi(2)).exp();
+        let Velocity { lately_moving, lately_turning, .. } = &self.velocity;
+        Prediction {
+            state: predicted,
+            joints_still: lately_turning.map(|speed| stillness(speed, BRISK_RAD_PER_SEC)),
+            trans_still: stillness(*lately_moving, BRISK_METRES_PER_SEC),
+        }
     }
 
     /// Takes the next frame's body over.
@@ -72,18 +85,29 @@ impl Body {
 }
 
 impl Velocity {
-    const NONE: Self = Self { moving: Vec3::ZERO, turning: [Vec3::ZERO; JOINT_COUNT] };
+    const NONE: Self = Self {
+        moving: Vec3::ZERO,
+        turning: [Vec3::ZERO; JOINT_COUNT],
+        lately_moving: 0.0,
+        lately_turning: [0.0; JOINT_COUNT],
+    };
 
     fn learn(&mut self, before: &BodyState, now: &BodyState, step_secs: f32, share: f32) {
+        /// A speed is forgotten to a third in this time.
+        const LATELY_SECS: f32 = 0.4;
         if step_secs < 1e-4 {
             return;
         }
+        let faded = (-step_secs / LATELY_SECS).exp();
         let moving = (now.trans - before.trans) / step_secs;
         self.moving += (moving - self.moving) * share;
+        self.lately_moving = self.moving.length().max(self.lately_moving * faded);
         for joint in 0..JOINT_COUNT {
             let turn = now.rotations[joint] * before.rotations[joint].inverse();
             let turning = axis_angle(turn) / step_secs;
             self.turning[joint] += (turning - self.turning[joint]) * share;
+            let speed = self.turning[joint].length();
+            self.lately_turning[joint] = speed.max(self.lately_turning[joint] * faded);
         }
     }
 

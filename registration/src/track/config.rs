@@ -53,7 +53,7 @@ impl Default for TrackConfig {
             search_points: 260,
             rim_px: 0,
             normal_error_rad: 0.0,
-            velocity_share: 1.0,
+            velocity_share: 0.4,
             rounds: 7,
             min_person_px: 1000,
             bad_error_m: 0.055,

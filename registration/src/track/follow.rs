@@ -106,6 +106,12 @@ impl Tracker {
             widen: 2.0,
             settled_from: 0.3,
         };
-        align(&self.shaped, &predicted, observation, &context, &effort)
+        align(
+            &self.shaped,
+            &predicted.state,
+            observation,
+            &context,
+            &effort,
+        )
     }
 }

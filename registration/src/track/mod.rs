@@ -20,8 +20,9 @@ use crate::{
     fit::ShapeFit,
     observe::{Extent, Observation, ObserveConfig},
     registered::{RegisteredFrame, Tracking},
+    residual::Prediction,
     smpl::BodyModel,
-    state::{BETA_COUNT, BodyState},
+    state::BETA_COUNT,
     surface::{ShapedSurface, Surface},
     world::World,
 };
@@ -167,7 +168,7 @@ impl Tracker {
         }
     }
 
-    fn context<'a>(&'a self, predicted: Option<&'a BodyState>) -> Context<'a> {
+    fn context<'a>(&'a self, predicted: Option<&'a Prediction>) -> Context<'a> {
         Context {
             energy: &self.config.energy,
             predicted,

@@ -50,10 +50,16 @@ impl Coarse {
             .for_each(|(y, (points, rays))| {
                 let above = &depth.metres[CELL_PX * y * depth.width..][..depth.width];
                 let below = &depth.metres[(CELL_PX * y + 1) * depth.width..][..depth.width];
-                let pairs = above.chunks_exact(CELL_PX).zip(below.chunks_exact(CELL_PX));
-                for ((point, ray), (above, below)) in points.iter_mut().zip(rays).zip(pairs) {
-                    *point =
-                        *ray * front_depth([above[0], above[1], below[0], below[1]], tolerance);
+                let pairs = || above.chunks_exact(CELL_PX).zip(below.chunks_exact(CELL_PX));
+                // Most cells see one surface: first all of them as if they did, several at a time.
+                for ((point, ray), (above, below)) in points.iter_mut().zip(rays).zip(pairs()) {
+                    *point = *ray * alike_depth([above[0], above[1], below[0], below[1]]);
+                }
+                for ((point, ray), (above, below)) in points.iter_mut().zip(rays).zip(pairs()) {
+                    if point.z.is_nan() {
+                        *point =
+                            *ray * front_depth([above[0], above[1], below[0], below[1]], tolerance);
+                    }
                 }
             });
     }
@@ -64,16 +70,21 @@ impl Coarse {
     }
 }
 
+/// The mean of four pixels that are alike; NaN if they are not, or one is missing.
+#[inline]
+fn alike_depth([a, b, c, d]: [f32; 4]) -> f32 {
+    // Written without regard to NaN, which the mean brings back in.
+    let larger = |a: f32, b: f32| if a > b { a } else { b };
+    let smaller = |a: f32, b: f32| if a < b { a } else { b };
+    let spread = larger(larger(a, b), larger(c, d)) - smaller(smaller(a, b), smaller(c, d));
+    let mean = 0.25 * (a + b + c + d);
+    if spread < ALIKE_M { mean } else { f32::NAN }
+}
+
+/// The mean of the pixels near the nearest one.
 #[inline]
 fn front_depth(pixels: [f32; 4], tolerance: &Tolerance) -> f32 {
     // `min` prefers a number to NaN.
-    let [a, b, c, d] = pixels;
-    let spread = a.max(b).max(c.max(d)) - a.min(b).min(c.min(d));
-    let mean = 0.25 * (a + b + c + d);
-    // Most cells are like this; NaN, of a missing pixel, is not.
-    if spread < ALIKE_M && !mean.is_nan() {
-        return mean;
-    }
     let nearest = pixels[0].min(pixels[1]).min(pixels[2].min(pixels[3]));
     if nearest.is_nan() {
         return f32::NAN;

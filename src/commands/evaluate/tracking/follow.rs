@@ -50,6 +50,7 @@ pub(super) fn follow(
             FrameScore::of_nobody(&registered, milliseconds)
         };
         scores.frames.push(score);
+        chain.recycle(registered);
     }
     scores.losses = losses_of(&moments, &scores.frames);
     if matches!(case.purpose, Purpose::Accuracy | Purpose::Stillness) {
@@ -73,6 +74,13 @@ impl Chain {
             anyhow::Ok(self.tracker.process(Arc::new(clean)))
         });
         Ok((registered?, milliseconds))
+    }
+
+    /// The frame's memory serves the next one.
+    fn recycle(&mut self, registered: RegisteredFrame) {
+        if let Ok(clean) = Arc::try_unwrap(registered.clean) {
+            self.cleaner.recycle(clean);
+        }
     }
 }
 
