@@ -1,4 +1,5 @@
-//! Draws contact sheets of simulated people: `contact_sheet OUT_DIR [ROUTINE|FILE.bvh [OUTFIT [SENSOR [SEED]]]]`.
+//! Draws contact sheets of simulated people: `contact_sheet OUT_DIR [ROUTINE|MOTION_FILE [OUTFIT|FILE.glb[#CLIP]
+//! [SENSOR [SEED]]]]`. A glTF character takes the place of an outfit.
 //!
 //! Top row: shaded colour; bottom row: depth as the sensor delivers it (near is bright, black is no answer).
 
@@ -6,7 +7,9 @@ use std::{env, error::Error, path::Path};
 
 use effigy_capture::{FrameId, FrameSource as _};
 use effigy_registration::{motion::Routine, smpl::builtin};
-use effigy_sim_sensor::{MotionChoice, OutfitKind, Scenario, SensorPreset, SimulatedSensor};
+use effigy_sim_sensor::{
+    MotionChoice, OutfitKind, Scenario, SensorPreset, SimulatedSensor, StrangerChoice,
+};
 
 const COLUMNS: u32 = 8;
 
@@ -18,14 +21,25 @@ fn main() -> Result<(), Box<dyn Error>> {
     let sensor = args.next().unwrap_or_else(|| "azure".to_owned());
     let seed = args.next().map_or(Ok(1), |seed| seed.parse())?;
     let choice = if Path::new(&motion).extension().is_some() {
-        MotionChoice::Bvh(motion.clone().into())
+        MotionChoice::File(motion.clone().into())
     } else {
         MotionChoice::Routine(named::<Routine>(&motion)?)
     };
+    let stranger = outfit.contains(".gl").then(|| {
+        let (path, clip) = outfit
+            .split_once('#')
+            .map_or((&*outfit, None), |(p, c)| (p, Some(c)));
+        StrangerChoice { path: path.into(), clip: clip.map(str::to_owned), height_m: None }
+    });
     let scenario = Scenario {
         seed,
         motion: choice,
-        outfit: named::<OutfitKind>(&outfit)?,
+        outfit: if stranger.is_some() {
+            OutfitKind::Demo
+        } else {
+            named::<OutfitKind>(&outfit)?
+        },
+        stranger,
         sensor: named::<SensorPreset>(&sensor)?,
         ..Scenario::default()
     };
@@ -35,7 +49,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         .unwrap_or_default()
         .to_string_lossy()
         .into_owned();
-    sheet.save(Path::new(&out).join(format!("{stem}_{outfit}_{sensor}_{seed}.png")))?;
+    let wearer = outfit.rsplit('/').next().unwrap_or_default();
+    sheet.save(Path::new(&out).join(format!("{stem}_{wearer}_{sensor}_{seed}.png")))?;
     Ok(())
 }
 

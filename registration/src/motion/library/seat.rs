@@ -27,6 +27,6 @@ pub(super) fn sit_down(at: Moment, style: &Style, rest: &RestBody, stance: &mut 
         arm.flexion_rad += 0.52 * seated + 0.30 * leaning;
         arm.abduction_rad -= 0.22 * seated;
         arm.elbow_rad += (0.62 + 0.05 * sign * style.asymmetry) * seated;
-        arm.twist_rad += 0.25 * seated;
+        arm.twist_rad -= 0.35 * seated;
     }
 }

@@ -13,9 +13,9 @@ use super::{
 const BEATS: f32 = 6.0;
 
 /// Fists up before the chin.
-const GUARD: Arm = Arm { abduction_rad: 0.30, flexion_rad: 0.55, twist_rad: 0.35, elbow_rad: 2.05 };
+const GUARD: Arm = Arm { abduction_rad: 0.30, flexion_rad: 0.55, twist_rad: -0.43, elbow_rad: 2.05 };
 const STRAIGHT: Arm =
-    Arm { abduction_rad: 0.16, flexion_rad: 1.50, twist_rad: 0.55, elbow_rad: 0.22 };
+    Arm { abduction_rad: 0.16, flexion_rad: 1.50, twist_rad: 0.0, elbow_rad: 0.22 };
 
 /// Left and right in turn, straight ahead, with hips and shoulders behind them.
 pub(super) fn punch(at: Moment, style: &Style, stance: &mut Stance) {
