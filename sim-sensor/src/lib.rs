@@ -23,7 +23,7 @@ pub mod truth;
 pub use error::SimError;
 pub use person::{Outfit, OutfitKind, Person};
 pub use preset::SensorPreset;
-pub use scenario::{MotionChoice, Noise, Room, Scenario};
+pub use scenario::{Likeness, MotionChoice, Noise, Room, Scenario};
 pub use sensor::SimulatedSensor;
 pub use stranger::{StrangerChoice, StrangerTruth};
 pub use truth::{ClothTruth, GroundTruth, Truth};

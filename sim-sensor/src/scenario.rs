@@ -20,6 +20,9 @@ pub struct Scenario {
     pub sensor: SensorPreset,
     pub motion: MotionChoice,
     pub outfit: OutfitKind,
+    /// Whether the body model can be the person exactly.
+    #[serde(skip_serializing_if = "Likeness::is_model")]
+    pub likeness: Likeness,
     /// Somebody else's character instead of a person of ours; outfit, fit and betas have no say then.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub stranger: Option<StrangerChoice>,
@@ -53,6 +56,26 @@ pub enum MotionChoice {
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
+pub enum Likeness {
+    /// Betas make the person.
+    #[default]
+    Model,
+    /// An adult of the survey with a surface of their own and flesh that moves; `betas` have no say.
+    Individual,
+}
+
+impl Likeness {
+    #[expect(
+        clippy::trivially_copy_pass_by_ref,
+        reason = "serde asks with a reference"
+    )]
+    fn is_model(&self) -> bool {
+        *self == Self::Model
+    }
+}
+
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Noise {
     /// As the sensor makes it.
     #[default]
@@ -82,6 +105,7 @@ impl Default for Scenario {
             sensor: SensorPreset::Azure,
             motion: MotionChoice::Routine(Routine::Mixture),
             outfit: OutfitKind::Demo,
+            likeness: Likeness::Model,
             stranger: None,
             fit: None,
             betas: None,

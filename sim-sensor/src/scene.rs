@@ -13,7 +13,7 @@ use crate::{
     error::SimError,
     person::{Outfit, Person, sample_betas},
     random::Randomness,
-    scenario::Scenario,
+    scenario::{Likeness, Scenario},
 };
 
 /// What sensor and truth share.
@@ -37,11 +37,15 @@ impl Scene {
                 expected: "none here: a character has no body-model truth; ask StrangerTruth",
             });
         }
-        let betas = scenario
-            .betas
-            .unwrap_or_else(|| sample_betas(&body, scenario.seed));
         let outfit = Outfit::new(scenario.outfit, scenario.seed);
-        let mut person = Person::new(body, betas, outfit, scenario.seed);
+        let mut person = match scenario.likeness {
+            Likeness::Individual => Person::individual(body, outfit, scenario.seed),
+            Likeness::Model => {
+                let sampled = || sample_betas(&body, scenario.seed);
+                let betas = scenario.betas.unwrap_or_else(sampled);
+                Person::new(body, betas, outfit, scenario.seed)
+            }
+        };
         let cloth = worn(&scenario, &mut person);
         let motion = scenario.motion(&person.rest_body())?;
         let world_from_camera = scenario.calibration().world_from_camera.unwrap_or_default();

@@ -27,8 +27,11 @@ pub struct Truth {
 pub struct GroundTruth {
     pub id: FrameId,
     pub timestamp: Timestamp,
-    /// In world space.
+    /// In world space; of an individual, the body model's nearest to them.
     pub params: BodyParams,
+    /// Root mean square distance of corresponding vertices from the body of `params` to the minimal body; 0 where
+    /// the body model can be the person exactly.
+    pub params_residual_m: f32,
     pub world_from_camera: Rigid3,
     /// The body under the clothes, in world space.
     pub minimal: PosedBody,
@@ -70,7 +73,16 @@ impl Truth {
     /// Frames in any order; with simulated clothes a frame far ahead costs the frames between.
     pub fn at(&self, frame: FrameId) -> GroundTruth {
         let person = &self.scene.person;
-        let params = self.params(frame);
+        let pose = self.scene.pose(frame);
+        let params = person.params(&pose.theta, pose.trans);
+        let of_params = person.body.pose(&params);
+        let (minimal, params_residual_m) = if person.individual.is_some() {
+            let minimal = person.minimal_posed(&pose.theta, pose.trans);
+            let residual_m = rms_distance_m(&minimal.vertices, &of_params.vertices);
+            (minimal, residual_m)
+        } else {
+            (of_params, 0.0)
+        };
         let (clothed_in_world, clothed_canonical, in_cloth) = match self.scene.in_cloth(frame) {
             Some(surface) => {
                 let ClothedSurface { posed, canonical, weights, layers } = surface.envelope();
@@ -82,8 +94,8 @@ impl Truth {
                 )
             }
             None => (
-                person.clothed_posed(&params.theta, params.trans),
-                person.clothed_canonical(&params.theta),
+                person.clothed_posed(&pose.theta, pose.trans),
+                person.clothed_canonical(&pose.theta),
                 None,
             ),
         };
@@ -91,12 +103,18 @@ impl Truth {
             id: frame,
             timestamp: self.scene.scenario.timestamp(frame),
             params,
+            params_residual_m,
             world_from_camera: self.scene.world_from_camera,
-            minimal: person.body.pose(&params),
+            minimal,
             clothed_in_world,
             clothed_canonical,
             in_cloth,
             rest_joints: person.rest_joints,
         }
     }
+}
+
+fn rms_distance_m(a: &[Vec3], b: &[Vec3]) -> f32 {
+    let squares: f32 = a.iter().zip(b).map(|(a, b)| a.distance_squared(*b)).sum();
+    (squares / a.len().max(1) as f32).sqrt()
 }

@@ -8,21 +8,26 @@ use std::sync::Arc;
 
 use effigy_fusion::mesh::TriangleMesh;
 use effigy_registration::{
-    BodyModel, BodyParams,
+    BodyModel, BodyParams, PosedBody,
     motion::RestBody,
     smpl::{BoneTransforms, JOINT_COUNT, star_transforms},
 };
 use glam::{Mat3, Vec3};
 
+mod anthropometry;
 pub(crate) mod chart;
+mod flesh;
 mod folds;
 mod identity;
+mod individual;
 mod outfit;
 mod paint;
 mod tailor;
 mod wrinkles;
 
+pub use anthropometry::{Adult, Sex};
 pub use identity::sample_betas;
+pub use individual::Individual;
 pub use outfit::{Garment, Outfit, OutfitKind, Shoes};
 pub use paint::{Material, Paint};
 
@@ -33,13 +38,18 @@ use tailor::Tailoring;
 #[derive(Clone, Debug)]
 pub struct Person {
     pub body: Arc<BodyModel>,
+    /// Of an individual: those whose body lies nearest to theirs.
     pub betas: [f32; 10],
     /// Joints of the minimal body in the zero pose.
     pub rest_joints: [Vec3; JOINT_COUNT],
     pub outfit: Outfit,
     /// Colours and infrared reflectance, for each vertex.
     pub paint: Paint,
+    /// What betas do not say, of people who are more than a body model.
+    pub individual: Option<Arc<Individual>>,
     minimal: Vec<Vec3>,
+    /// The pelvis of the body that `betas` make.
+    pelvis_of_betas: Vec3,
     tailoring: Tailoring,
 }
 
@@ -47,11 +57,46 @@ impl Person {
     /// Somebody with these betas in this outfit; the seed decides on folds, hair and colours.
     pub fn new(body: Arc<BodyModel>, betas: [f32; 10], outfit: Outfit, seed: u64) -> Self {
         let minimal = body.shaped_vertices(&betas);
+        Self::with_surface(body, (betas, minimal), None, outfit, seed)
+    }
+
+    /// An adult by number whose body is their own: no betas make it exactly, and flesh moves with the pose.
+    pub fn individual(body: Arc<BodyModel>, outfit: Outfit, seed: u64) -> Self {
+        let adult = Adult::sample(&body, seed);
+        let mut minimal = body.shaped_vertices(&adult.betas);
+        let chart = Chart::new(&body, minimal.clone(), &body.joints(&minimal));
+        let individual = Individual::new(&body, adult, &chart, seed);
+        for (vertex, offset) in minimal.iter_mut().zip(&individual.offsets) {
+            *vertex += *offset;
+        }
+        let betas = individual::best_betas(&body, &minimal);
+        let individual = Some(Arc::new(individual));
+        Self::with_surface(body, (betas, minimal), individual, outfit, seed)
+    }
+
+    fn with_surface(
+        body: Arc<BodyModel>,
+        (betas, minimal): ([f32; 10], Vec<Vec3>),
+        individual: Option<Arc<Individual>>,
+        outfit: Outfit,
+        seed: u64,
+    ) -> Self {
         let rest_joints = body.joints(&minimal);
+        let pelvis_of_betas = body.joints(&body.shaped_vertices(&betas))[0];
         let chart = Chart::new(&body, minimal.clone(), &rest_joints);
         let tailoring = Tailoring::new(&chart, &outfit, seed);
         let paint = Paint::new(&tailoring, seed);
-        Self { body, betas, rest_joints, outfit, paint, minimal, tailoring }
+        Self {
+            body,
+            betas,
+            rest_joints,
+            outfit,
+            paint,
+            individual,
+            minimal,
+            pelvis_of_betas,
+            tailoring,
+        }
     }
 
     /// Somebody from the population, 1.50 to 1.95 m tall.
@@ -64,7 +109,19 @@ impl Person {
     pub fn minimal_zero_pose(&self, theta: &[Vec3; JOINT_COUNT]) -> Vec<Vec3> {
         let mut vertices = self.minimal.clone();
         self.body.add_pose_correctives(&mut vertices, theta);
+        if let Some(individual) = &self.individual {
+            individual
+                .flesh
+                .move_with(&mut vertices, theta, &self.rest_joints);
+        }
         vertices
+    }
+
+    /// The minimal body in the space of `trans`.
+    pub fn minimal_posed(&self, theta: &[Vec3; JOINT_COUNT], trans: Vec3) -> PosedBody {
+        let (bones, joints) = BoneTransforms::from_pose(theta, &self.rest_joints);
+        let vertices = self.skinned(self.minimal_zero_pose(theta), &bones, trans);
+        PosedBody { vertices, joints: joints.map(|joint| joint + trans), bones }
     }
 
     /// The outer surface in the zero pose, with correctives, folds and sag of the pose.
@@ -123,7 +180,9 @@ impl Person {
         RestBody::with_surface(&self.body, &self.rest_joints, &standing)
     }
 
+    /// The parameters of the body model that come nearest: the pelvises lie on each other.
     pub fn params(&self, theta: &[Vec3; JOINT_COUNT], trans: Vec3) -> BodyParams {
+        let trans = trans + (self.rest_joints[0] - self.pelvis_of_betas);
         BodyParams { betas: self.betas, theta: *theta, trans }
     }
 
@@ -145,5 +204,7 @@ fn bends(theta: &[Vec3; JOINT_COUNT]) -> [Mat3; JOINT_COUNT] {
     theta.map(|t| effigy_registration::smpl::rotation_from_axis_angle(t) - Mat3::IDENTITY)
 }
 
+#[cfg(test)]
+mod individual_tests;
 #[cfg(test)]
 mod tests;

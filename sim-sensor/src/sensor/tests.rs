@@ -8,7 +8,7 @@ use super::*;
 use crate::{
     person::OutfitKind,
     preset::SensorPreset,
-    scenario::{MotionChoice, Room},
+    scenario::{Likeness, MotionChoice, Room},
     truth::Truth,
 };
 
@@ -169,6 +169,45 @@ fn same_hue(shaded: [u8; 3], color: [u8; 3]) -> bool {
     a.dot(b) > 0.997
 }
 
+#[test]
+fn the_best_parameters_of_an_individual_come_with_their_residual() {
+    for likeness in [Likeness::Model, Likeness::Individual] {
+        let scenario = Scenario { likeness, ..scenario(SensorPreset::Azure, Routine::Squat) };
+        let truth = Truth::new(&scenario, builtin::body()).unwrap();
+        let ground = truth.at(FrameId(40));
+        let of_params = truth.person().body.pose(&ground.params);
+        let joints_m = (0..24)
+            .map(|j| of_params.joints[j].distance(ground.minimal.joints[j]))
+            .fold(0.0, f32::max);
+        match likeness {
+            Likeness::Model => assert_eq!((ground.params_residual_m, joints_m), (0.0, 0.0)),
+            Likeness::Individual => {
+                let residual_m = ground.params_residual_m;
+                assert!((0.001..0.02).contains(&residual_m), "{residual_m} m");
+                assert!(
+                    joints_m < 0.02,
+                    "the skeleton is nearly the model's: {joints_m} m"
+                );
+            }
+        }
+        let mut sensor = SimulatedSensor::new(&scenario, builtin::body()).unwrap();
+        let lowest_m = ground
+            .clothed_in_world
+            .vertices
+            .iter()
+            .map(|v| v.y)
+            .fold(f32::MAX, f32::min);
+        assert!(lowest_m.abs() < 0.01, "on the floor, not at {lowest_m} m");
+        assert!(
+            sensor
+                .view(FrameId(40))
+                .labels
+                .iter()
+                .any(|label| label.is_person())
+        );
+    }
+}
+
 /// Betas of the tallest of some people.
 fn tallest() -> [f32; 10] {
     let body = builtin::body();
@@ -185,7 +224,7 @@ fn tallest() -> [f32; 10] {
 #[test]
 fn the_whole_body_is_in_view_and_on_the_floor() {
     let betas = Some(tallest());
-    for routine in Routine::ALL {
+    for routine in Routine::ALL.into_iter().chain(Routine::ACTIONS) {
         for preset in SensorPreset::ALL {
             let outfit = OutfitKind::Loose;
             let scenario = Scenario { outfit, betas, ..scenario(preset, routine) };

@@ -13,7 +13,8 @@ use super::{
 const BEATS: f32 = 6.0;
 
 /// Fists up before the chin.
-const GUARD: Arm = Arm { abduction_rad: 0.30, flexion_rad: 0.55, twist_rad: -0.43, elbow_rad: 2.05 };
+const GUARD: Arm =
+    Arm { abduction_rad: 0.30, flexion_rad: 0.55, twist_rad: -0.65, elbow_rad: 2.05 };
 const STRAIGHT: Arm =
     Arm { abduction_rad: 0.16, flexion_rad: 1.50, twist_rad: 0.0, elbow_rad: 0.22 };
 
@@ -91,7 +92,7 @@ pub(super) fn reach(at: Moment, style: &Style, rest: &RestBody, stance: &mut Sta
     let up = window(x, 0.02, 0.50, 0.19) * style.amplitude.min(1.0);
     let down = window(x, 0.50, 0.98, 0.20) * style.amplitude.min(1.0);
     let leg_m = rest.joints[1].y - rest.joints[7].y;
-    let shelf = Arm { abduction_rad: 0.40, flexion_rad: 2.55, twist_rad: 0.0, elbow_rad: 0.18 };
+    let shelf = Arm { abduction_rad: 2.30, flexion_rad: 0.40, twist_rad: -0.40, elbow_rad: 0.30 };
     stance.arms[1] = blend_arm(stance.arms[1], shelf, up);
     stance.arms[0].flexion_rad += 1.35 * down - 0.10 * up;
     stance.arms[0].abduction_rad -= 0.15 * down;
@@ -105,11 +106,11 @@ pub(super) fn reach(at: Moment, style: &Style, rest: &RestBody, stance: &mut Sta
     stance.pelvis_tilt += Vec3::new(0.45 * down, 0.08 * up - 0.12 * down, 0.0);
     stance.pelvis_shift_m += Vec3::new(
         0.0,
-        0.05 * up - 0.20 * down * leg_m,
+        0.025 * up - 0.20 * down * leg_m,
         0.02 * up - 0.12 * down * leg_m,
     );
     stance.head.x += 0.12 * down - 0.32 * up;
     for foot in &mut stance.feet {
-        foot.pitch_rad += 0.42 * up;
+        foot.pitch_rad += 0.22 * up;
     }
 }

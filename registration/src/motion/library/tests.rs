@@ -154,3 +154,126 @@ fn seeds_vary_a_movement_and_repeat_it_exactly() {
     assert_eq!(of(5), of(5));
     assert_ne!(of(5).poses.len(), of(6).poses.len(), "tempo differs");
 }
+
+/// Joints in world space in every frame of a movement.
+fn joints_of(routine: Routine) -> Vec<[glam::Vec3; 24]> {
+    let rest = rest();
+    let motion = routine.motion(&rest, RATE_HZ, 3);
+    let of = |pose: &MotionPose| {
+        let (_, joints) = BoneTransforms::from_pose(&pose.theta, &rest.joints);
+        joints.map(|joint| joint + pose.trans)
+    };
+    motion.poses.iter().map(of).collect()
+}
+
+fn most(routine: Routine, of: &dyn Fn(&[glam::Vec3; 24]) -> f32) -> f32 {
+    joints_of(routine).iter().map(of).fold(f32::MIN, f32::max)
+}
+
+/// What somebody who knows the movement by name would look for.
+#[test]
+fn arms_and_legs_do_what_their_actions_names_say() {
+    let fist = |side: usize| move |j: &[glam::Vec3; 24]| j[20 + side].z - j[16 + side].z;
+    for side in 0..2 {
+        assert!(
+            most(Routine::Punch, &fist(side)) > 0.35,
+            "fist {side} goes straight ahead"
+        );
+        let over_head = |j: &[glam::Vec3; 24]| j[20 + side].y - j[15].y;
+        assert!(
+            most(Routine::ShoulderMill, &over_head) > 0.1,
+            "arm {side} goes over the top"
+        );
+        let kicked = |j: &[glam::Vec3; 24]| (j[10 + side].z - j[0].z).min(4.0 * j[10 + side].y);
+        assert!(
+            most(Routine::SoccerKick, &kicked) > 0.3,
+            "foot {side} is in front, off the floor"
+        );
+        let back = |j: &[glam::Vec3; 24]| j[0].z - j[10 + side].z;
+        assert!(
+            most(Routine::SoccerKick, &back) > 0.25,
+            "foot {side} swings back first"
+        );
+    }
+    assert!(
+        most(Routine::Reach, &|j| j[21].y - j[15].y) > 0.15,
+        "a hand over the head"
+    );
+    assert!(
+        most(Routine::Reach, &|j| j[16].y - j[20].y) > 0.4,
+        "the other goes down"
+    );
+    assert!(
+        most(Routine::Reach, &|j| -j[20].y) > -0.75,
+        "to the knee's height"
+    );
+    assert!(
+        most(Routine::Bend, &|j| -j[20].y) > -0.65,
+        "hands at the knees"
+    );
+    assert!(
+        most(Routine::Bend, &|j| j[0].z - j[12].z) > 0.05,
+        "and back over the heels"
+    );
+}
+
+#[test]
+fn trunks_do_what_their_actions_names_say() {
+    let standing_m = joints_of(Routine::SitDown)[0][0].y;
+    let low = most(Routine::SitDown, &|j| standing_m - j[0].y);
+    assert!(
+        (0.25..0.55).contains(&low),
+        "a chair's height: {low} m lower"
+    );
+    assert!(
+        most(Routine::SitDown, &|j| (j[4] - j[1]).with_y(0.0).length()) > 0.33,
+        "thighs level"
+    );
+    let back_m = most(Routine::Walk, &|j| -j[0].z) + joints_of(Routine::Walk)[0][0].z;
+    assert!((0.5..1.2).contains(&back_m), "three steps back: {back_m} m");
+    let circle = |axis: usize| most(Routine::Hips, &|j| j[0][axis] - j[12][axis]);
+    assert!(
+        circle(0) > 0.05 && circle(2) > 0.05,
+        "hips leave the shoulders' plumb line all around"
+    );
+    let turned = |j: &[glam::Vec3; 24]| {
+        let [shoulders, hips] = [j[16] - j[17], j[1] - j[2]].map(|v| v.z.atan2(v.x));
+        (shoulders - hips).abs()
+    };
+    assert!(
+        most(Routine::Twist, &turned) > 0.5,
+        "shoulders against hips, radians"
+    );
+    let spin = Routine::BallerinaSpin.motion(&rest(), RATE_HZ, 3);
+    let turned: f32 = spin
+        .poses
+        .windows(2)
+        .map(|w| {
+            let step = facing_rad(&w[1]) - facing_rad(&w[0]);
+            (step + std::f32::consts::PI).rem_euclid(std::f32::consts::TAU) - std::f32::consts::PI
+        })
+        .sum();
+    assert!(
+        (turned.abs() - std::f32::consts::TAU).abs() < 0.05,
+        "once around: {turned} rad"
+    );
+    assert!(
+        most(Routine::BallerinaSpin, &|j| j[8].y) > 0.3,
+        "a foot at the knee"
+    );
+    for (routine, up, down) in [
+        (Routine::FlyingEagle, 0.2, 0.15),
+        (Routine::ChickenWings, 0.0, 0.05),
+    ] {
+        let joint = if routine == Routine::FlyingEagle {
+            20
+        } else {
+            18
+        };
+        assert!(
+            most(routine, &|j| j[joint].y - j[16].y) > up - 0.1,
+            "wings go up"
+        );
+        assert!(most(routine, &|j| j[16].y - j[joint].y) > down, "and down");
+    }
+}

@@ -42,9 +42,9 @@ pub(super) fn hips(at: Moment, style: &Style, rest: &RestBody, stance: &mut Stan
     let (sin, cos) = (std::f32::consts::TAU * CIRCLES * x).sin_cos();
     let leg_m = rest.joints[1].y - rest.joints[7].y;
     stance.pelvis_shift_m += Vec3::new(way * sin, -0.25, 0.8 * cos) * RADIUS * leg_m * size;
-    stance.pelvis_tilt += Vec3::new(-0.16 * cos, 0.05 * sin, 0.14 * way * sin) * size;
+    stance.pelvis_tilt += Vec3::new(-0.12 * cos, 0.05 * sin, 0.08 * way * sin) * size;
     // The shoulders stay behind.
-    stance.spine += Vec3::new(0.18 * cos, 0.0, -0.20 * way * sin) * size;
+    stance.spine += Vec3::new(-0.08 * cos, 0.0, 0.12 * way * sin) * size;
     let held = window(x, 0.0, 1.0, 0.16);
     for arm in &mut stance.arms {
         *arm = blend_arm(*arm, hand_on_hip(), held);
