@@ -13,6 +13,8 @@ use crate::person::chart::Place;
 
 /// Shirts and skirts follow the body down to here; what hangs below has a shape of its own.
 const SEAM_ABOVE_CROTCH_M: f32 = 0.085;
+/// A shirt that is tucked in ends here, under the belt.
+const TUCKED_ABOVE_HIPS_M: f32 = 0.070;
 /// The collar's plane leans forwards.
 const COLLAR_UP: Vec3 = Vec3::new(0.0, 0.92, 0.39);
 /// A collar is this much wider than the neck.
@@ -24,6 +26,11 @@ const HOOD_ABOVE_NECK_M: f32 = 0.050;
 /// The height of the seam between what follows the body and what hangs.
 pub(super) fn seam_height_m(form: &Form) -> f32 {
     form.crotch_m + SEAM_ABOVE_CROTCH_M
+}
+
+/// Where a shirt ends that is tucked in.
+pub(super) fn tucked_hem_m(form: &Form) -> f32 {
+    form.leg_height_m(0.0) + TUCKED_ABOVE_HIPS_M
 }
 
 /// The part of the body that a garment follows, in the cut pose.
@@ -47,8 +54,12 @@ pub(super) fn covered(form: &Form, pattern: &Pattern) -> Sheet {
         Limbs::Legs { end } => fields.push(limb(form, end, |place| place.leg, [1, 4, 7])),
         Limbs::None => {}
     }
-    if pattern.hem.is_some() {
-        let seam_m = seam_height_m(form);
+    if pattern.hem.is_some() || pattern.is_tucked_in() {
+        let seam_m = if pattern.is_tucked_in() {
+            tucked_hem_m(form)
+        } else {
+            seam_height_m(form)
+        };
         // Hands hang as low as the seam in this pose; the zero pose tells them from the hips.
         fields.push(of_points(form, |p, place| {
             (p.y - seam_m).max(4.0 * smooth_arm(place) - 0.5)

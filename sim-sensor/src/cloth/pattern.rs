@@ -8,7 +8,7 @@ pub struct Pattern {
     pub name: &'static str,
     pub top: Top,
     pub limbs: Limbs,
-    /// Where a shirt or skirt ends, as a station of the leg; trousers have none.
+    /// Where a shirt or skirt ends, as a station of the leg. Trousers have none; a shirt without one is tucked in.
     pub hem: Option<f32>,
     pub front: Front,
     pub ease: Ease,
@@ -138,18 +138,22 @@ impl ClothKind {
             Self::PoloTrousers => vec![tailor.slim_trousers(), tailor.polo()],
             Self::HoodieTrousers => vec![tailor.slim_trousers(), tailor.hoodie()],
             Self::BlazerTrousers => {
-                let close = Tailor { fit: 0.12, ..tailor };
-                vec![tailor.slim_trousers(), close.undershirt(), tailor.blazer()]
+                let close = Tailor { fit: 0.3, ..tailor };
+                vec![close.undershirt(), tailor.slim_trousers(), tailor.blazer()]
             }
             Self::Skirt => {
-                let tucked_in = Tailor { fit: 0.1 + 0.25 * fit, ..tailor };
-                vec![
-                    Pattern { hem: Some(0.06), ..tucked_in.tshirt() },
-                    tailor.skirt(),
-                ]
+                let close = Tailor { fit: 0.3 + 0.4 * fit, ..tailor };
+                vec![close.tucked_in(), tailor.skirt()]
             }
             Self::Dress => vec![tailor.dress()],
         }
+    }
+}
+
+impl Pattern {
+    /// Whether it is a shirt that ends under a belt.
+    pub fn is_tucked_in(&self) -> bool {
+        self.hem.is_none() && matches!(self.limbs, Limbs::Arms { .. })
     }
 }
 
@@ -222,10 +226,15 @@ impl Tailor {
         }
     }
 
+    /// A T-shirt that ends under a belt.
+    fn tucked_in(&self) -> Pattern {
+        let shirt = self.tshirt();
+        Pattern { name: "T-shirt, tucked in", hem: None, ..shirt }
+    }
+
     fn undershirt(&self) -> Pattern {
-        let mut shirt = self.tshirt();
+        let mut shirt = self.tucked_in();
         shirt.name = "shirt under a blazer";
-        shirt.hem = Some(0.08);
         shirt.limbs = Limbs::Arms { end: 0.5 };
         shirt.material = WHITE;
         shirt
@@ -352,10 +361,10 @@ impl Tailor {
             hem: Some(self.random.between(12, 0.80, 1.10)),
             front: Front::Closed,
             ease: Ease {
-                trunk_m: self.by_fit(0.005, 0.012),
+                trunk_m: self.by_fit(0.012, 0.024),
                 limb_m: 0.0,
                 end_m: 0.0,
-                hem_m: self.by_fit(0.010, 0.020),
+                hem_m: self.by_fit(0.020, 0.034),
                 flare: self.by_fit(0.10, 0.38),
                 ribbed: false,
             },

@@ -5,7 +5,7 @@ use effigy_registration::smpl::VertexWeights;
 use glam::{Vec3, vec2};
 
 use super::{
-    cut::{clipped_by, covered, seam_height_m},
+    cut::{clipped_by, covered, seam_height_m, tucked_hem_m},
     form::Form,
     pattern::{Front, Limbs, Pattern, Top},
     remesh::remeshed,
@@ -220,6 +220,10 @@ fn ease_m(pattern: &Pattern, place: &Place, point: Vec3, form: &Form) -> f32 {
             ease_m = CLOSEST_M + (ease_m - CLOSEST_M) * smoothstep(0.09, 0.19, from_neck_m);
         }
     }
+    if pattern.is_tucked_in() {
+        let above_m = point.y - tucked_hem_m(form);
+        ease_m = CLOSEST_M + (ease_m - CLOSEST_M) * smoothstep(0.02, 0.10, above_m);
+    }
     if pattern.hem.is_some() && !matches!(pattern.top, Top::Waist { .. }) {
         let above_m = point.y - seam_height_m(form);
         let near_hem = smoothstep(0.40, 0.0, above_m) * (1.0 - smoothstep(-0.1, 0.1, along));
@@ -379,18 +383,23 @@ fn add_folded_collar(sheet: &mut Sheet, neck: Vec3) {
 fn held(form: &Form, pattern: &Pattern, sheet: &Sheet) -> Vec<Held> {
     let waist_m = form.leg_height_m(0.0);
     let neck = form.joints[12];
-    let (bones, compliance): (&[u8], f32) = match pattern.top {
-        Top::Waist { .. } => (&[0, 3], BELT_COMPLIANCE),
-        _ => (&[6, 9, 12, 13, 14], NECK_COMPLIANCE),
-    };
-    let is_held = |point: Vec3| match pattern.top {
-        Top::Waist { above_hips_m } => point.y > waist_m + above_hips_m - BELT_M,
+    const WAIST: (&[u8], f32) = (&[0, 3], BELT_COMPLIANCE);
+    const NECK: (&[u8], f32) = (&[6, 9, 12, 13, 14], NECK_COMPLIANCE);
+    let holding = |point: Vec3| match pattern.top {
+        Top::Waist { above_hips_m } => (point.y > waist_m + above_hips_m - BELT_M).then_some(WAIST),
         Top::Collar { .. } | Top::FoldedCollar { .. } => {
-            point.z < neck.z + 0.02 && point.distance(neck) < NECK_SEAM_M
+            let on_neck = point.z < neck.z + 0.02 && point.distance(neck) < NECK_SEAM_M;
+            let under_belt = pattern.is_tucked_in() && point.y < tucked_hem_m(form) + BELT_M;
+            if on_neck {
+                Some(NECK)
+            } else {
+                under_belt.then_some(WAIST)
+            }
         }
-        Top::Hood => false,
+        Top::Hood => None,
     };
     let held = |(v, &point): (usize, &Vec3)| {
+        let (bones, compliance) = holding(point)?;
         let shares = form.bone_shares(point, false);
         let total: f32 = bones.iter().map(|&bone| shares[bone as usize]).sum();
         let mut weights = VertexWeights::default();
@@ -411,12 +420,9 @@ fn held(form: &Form, pattern: &Pattern, sheet: &Sheet) -> Vec<Held> {
             }
         }
         let at_rest = form.bones.blend(&weights).inverse().transform_point3(point);
-        Held { point: v as u32, at_rest, weights, compliance }
+        Some(Held { point: v as u32, at_rest, weights, compliance })
     };
-    (sheet.points.iter().enumerate())
-        .filter(|&(_, &point)| is_held(point))
-        .map(held)
-        .collect()
+    sheet.points.iter().enumerate().filter_map(held).collect()
 }
 
 /// 0 at `from`, 1 at `to` (which may be the smaller one), smooth between.

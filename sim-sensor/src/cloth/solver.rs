@@ -17,7 +17,7 @@ const REACH_M: f32 = 0.035;
 /// Contacts are kept ready this far beyond touching.
 const MARGIN_M: f32 = 0.004;
 /// Cloth on cloth moves along with it, by this share in each step.
-const LAYER_CLING: f32 = 0.25;
+const LAYER_CLING: f32 = 0.1;
 /// Edges bent more than this in the rest shape are folds that stay.
 const CREASE_COSINE: f32 = 0.8;
 /// Folds that stay are this much stiffer.

@@ -104,7 +104,7 @@ impl Wear {
         let mut garments: Vec<Garment> = Vec::new();
         for pattern in kind.patterns(fit, seed) {
             let garment = if matches!(pattern.limbs, Limbs::Legs { .. }) {
-                sew(&seat, &pattern, &[], &form)
+                sew(&seat, &pattern, &garments, &form)
             } else {
                 sew(&form, &pattern, &garments, &form)
             };
