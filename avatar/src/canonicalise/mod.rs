@@ -1,6 +1,7 @@
 //! From a registered depth frame to canonical samples: points on the person's surface and in the empty
 //! space around it, moved to star pose and unit space.
 
+mod contact;
 mod free_space;
 mod unpose;
 
@@ -19,6 +20,7 @@ use crate::{
     samples::CanonicalSamples,
     skinning::{ClosestBodyPoint, ClosestBodyPointConfig, Skinning, Warp},
 };
+use contact::Contacts;
 use unpose::Unposer;
 
 /// Which points are taken from a frame, and which of them are believed.
@@ -33,6 +35,10 @@ pub struct CanonicaliseConfig {
     pub max_distance_to_body_m: f32,
     /// Points that inverse and forward skinning do not bring back to within this are dropped.
     pub max_return_m: f32,
+    /// Within this of a forearm and of the rest of the body, a point's side is in doubt...
+    pub contact_reach_m: f32,
+    /// ...unless it is nearer to one by at least this much.
+    pub contact_margin_m: f32,
     /// Corrections of a canonical point by forward skinning: each makes driving reproduce it better.
     pub refine_steps: usize,
     /// Grazing rays see little and err much: no say below this cosine of ray and normal.
@@ -57,6 +63,8 @@ impl Default for CanonicaliseConfig {
             free_points: 2500,
             max_distance_to_body_m: 0.10,
             max_return_m: 0.02,
+            contact_reach_m: 0.10,
+            contact_margin_m: 0.04,
             refine_steps: 3,
             min_view_cosine: 0.15,
             full_weight_sigma_m: 0.003,
@@ -75,6 +83,8 @@ pub struct CanonicaliseCounts {
     pub observed: usize,
     pub kept: usize,
     pub far_from_body: usize,
+    /// Where a hand is near something else.
+    pub in_contact: usize,
     pub not_returned: usize,
     pub outside_box: usize,
     pub free: usize,
@@ -153,7 +163,11 @@ impl Canonicaliser {
             warp: &warp,
             refine_steps: self.config.refine_steps,
         };
-        let (points_in_unit, normals, weights) = self.surface(&seen, &unposer, &mut counts);
+        let (reach_m, margin_m) = (self.config.contact_reach_m, self.config.contact_margin_m);
+        let contacts = Contacts::new(&self.model, &posed.vertices, reach_m, margin_m);
+        let undecided = contacts.are_undecided(&seen.points);
+        let (points_in_unit, normals, weights) =
+            self.surface(&seen, &undecided, &unposer, &mut counts);
 
         let free = free_space::points_in_world(frame, self.rays.as_ref(), &self.config, &mut rng);
         let free_in_unit = self.free(&free, &unposer);
@@ -220,16 +234,20 @@ impl Canonicaliser {
     fn surface(
         &self,
         seen: &Observed,
+        undecided: &[bool],
         unposer: &Unposer<'_>,
         counts: &mut CanonicaliseCounts,
     ) -> (Vec<Vec3>, Vec<Vec3>, Vec<f32>) {
         let limit_m = self.config.max_distance_to_body_m;
         let returned = unposer.unpose(&seen.points, &seen.normals, limit_m);
         let (mut points, mut normals, mut weights) = (Vec::new(), Vec::new(), Vec::new());
-        for (point, &weight) in returned.iter().zip(&seen.weights) {
+        let judged = returned.iter().zip(&seen.weights).zip(undecided);
+        for ((point, &weight), &undecided) in judged {
             let in_unit = self.subject.unit_box.unit_from_canonical(point.canonical);
             if point.distance_to_body_m > limit_m {
                 counts.far_from_body += 1;
+            } else if undecided {
+                counts.in_contact += 1;
             } else if point.miss_m.is_nan() || point.miss_m > self.config.max_return_m {
                 counts.not_returned += 1;
             } else if !in_unit_box(in_unit) {

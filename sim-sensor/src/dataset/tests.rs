@@ -140,7 +140,7 @@ fn no_test_person_and_no_blazer_is_ever_learned_from() {
                     && sequence.action == other.action
             };
             assert!(
-                !test.iter().any(|sequence| same(&&sequence)),
+                !test.iter().any(|sequence| same(&sequence)),
                 "{}",
                 other.name
             );
