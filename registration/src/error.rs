@@ -1,4 +1,4 @@
-//! What can go wrong with body and motion files.
+//! What can go wrong with body and motion files, and with surfaces handed in.
 
 use std::path::PathBuf;
 
@@ -24,4 +24,8 @@ pub enum RegistrationError {
          SMPL-H or SMPL-X?"
     )]
     BodyArray { path: PathBuf, array: &'static str, expected: String, found: String },
+    #[error(
+        "a surface to follow has {got} offsets, the body model {expected} vertices; was it made for another body?"
+    )]
+    SurfaceMismatch { got: usize, expected: usize },
 }

@@ -22,9 +22,22 @@ pub(crate) struct ShapedSurface {
 
 impl ShapedSurface {
     pub(crate) fn new(surface: &Arc<Surface>, betas: [f32; BETA_COUNT]) -> Self {
+        Self::wearing(surface, betas, None)
+    }
+
+    /// The surface of what the person wears: each of the model's vertices moved by an offset in the zero pose.
+    pub(crate) fn wearing(
+        surface: &Arc<Surface>,
+        betas: [f32; BETA_COUNT],
+        offsets: Option<&[Vec3]>,
+    ) -> Self {
         let model = &surface.model;
-        let whole = model.shaped_vertices(&betas);
+        let mut whole = model.shaped_vertices(&betas);
+        // Joints are the body's, whatever it wears.
         let rest_joints = model.joints(&whole);
+        for (vertex, offset) in whole.iter_mut().zip(offsets.unwrap_or_default()) {
+            *vertex += *offset;
+        }
         let whole_normals = vertex_normals(&whole, &model.triangles);
         let joint_dirs = std::array::from_fn(|k| {
             model

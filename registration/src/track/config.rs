@@ -25,7 +25,7 @@ pub struct TrackConfig {
     pub rounds: usize,
     /// Fewer person pixels are nobody (field practice: re-initialise below 1000).
     pub min_person_px: usize,
-    /// Drawn body and picture differ by more than this on average: the track is bad.
+    /// Drawn body and picture differ by more than this on average, beyond the sensor's noise: the track is bad.
     pub bad_error_m: f32,
     /// A search must end below this to be believed.
     pub found_error_m: f32,

@@ -3,7 +3,7 @@
 use effigy_fusion::CleanFrame;
 
 use super::{
-    Tracker,
+    Tracker, beyond_noise_m,
     phase::{Following, Phase},
     tracked,
 };
@@ -35,7 +35,12 @@ impl Tracker {
         let Some(best) = found.first() else {
             return lost;
         };
-        if best.agreement.error_m > self.config.found_error_m {
+        tracing::trace!(
+            error_m = best.agreement.error_m,
+            stray = best.stray,
+            "searched"
+        );
+        if beyond_noise_m(best, observation) > self.config.found_error_m {
             return lost;
         }
         if !best.shows_whole_body() {
@@ -79,7 +84,7 @@ impl Tracker {
             &self.config.fit,
             &context,
         );
-        self.shaped = ShapedSurface::new(&self.surface, fitted.betas);
+        self.shaped = self.dressed(&self.surface, fitted.betas);
         let effort = Effort {
             rounds: self.config.rounds,
             every: 1,
@@ -113,14 +118,14 @@ impl Tracker {
     }
 
     pub(super) fn search_shape(&self) -> ShapedSurface {
-        ShapedSurface::new(&self.search_surface, self.shaped.betas)
+        self.dressed(&self.search_surface, self.shaped.betas)
     }
 
     pub(super) fn searcher<'a>(&'a self, coarse: &'a ShapedSurface) -> Searcher<'a> {
         Searcher {
             coarse,
             fine: &self.shaped,
-            energy: &self.config.energy,
+            energy: &self.energy,
             grounded: self.world.is_grounded(),
             config: &self.config.search,
         }

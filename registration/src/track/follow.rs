@@ -3,7 +3,7 @@
 use effigy_fusion::CleanFrame;
 
 use super::{
-    Tracker,
+    Tracker, beyond_noise_m,
     body::Body,
     phase::{Following, Phase},
     tracked,
@@ -57,7 +57,8 @@ impl Tracker {
             "followed"
         );
         let bad = whole
-            && (found.agreement.error_m > self.config.bad_error_m || !found.shows_whole_body());
+            && (beyond_noise_m(&found, observation) > self.config.bad_error_m
+                || !found.shows_whole_body());
         following.bad_since = bad.then(|| following.bad_since.unwrap_or(now));
         if let Some(since) = following.bad_since
             && (now - since) as f32 >= self.config.patience_secs

@@ -7,7 +7,6 @@ use crate::{
     align::{Context, Effort, align},
     fit::Moment,
     observe::Observation,
-    surface::ShapedSurface,
 };
 
 impl Tracker {
@@ -35,14 +34,13 @@ impl Tracker {
             return;
         };
         let old_pelvis = self.shaped.rest_joints[0];
-        self.shaped = ShapedSurface::new(&self.surface, betas);
+        self.shaped = self.dressed(&self.surface, betas);
         let shift = old_pelvis - self.shaped.rest_joints[0];
         for body in &mut following.bodies {
             body.state.betas = betas;
             body.state.trans += shift;
             // The new shape settles in on the frame it was made in, so that the next one starts from rest.
-            let context =
-                Context { energy: &self.config.energy, predicted: None, grounded, whole: true };
+            let context = Context { energy: &self.energy, predicted: None, grounded, whole: true };
             let effort = Effort {
                 rounds: self.config.rounds,
                 every: 2,

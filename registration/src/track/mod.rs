@@ -6,6 +6,7 @@ mod find;
 mod follow;
 mod learn_shape;
 mod phase;
+mod worn;
 
 pub use config::TrackConfig;
 
@@ -14,9 +15,11 @@ use std::sync::Arc;
 use effigy_capture::{CameraModel, Rigid3, Timestamp};
 use effigy_fusion::{CleanFrame, clean::PersonVisibility};
 
+use glam::Vec3;
+
 use self::phase::Phase;
 use crate::{
-    align::{Aligned, Context},
+    align::{Aligned, Context, EnergyConfig},
     fit::ShapeFit,
     observe::{Extent, Observation, ObserveConfig},
     registered::{RegisteredFrame, Tracking},
@@ -38,6 +41,10 @@ pub struct Tracker {
     shaped: ShapedSurface,
     shape: ShapeFit,
     shape_known: bool,
+    /// For each of the model's vertices how far the surface that is followed is off it in the zero pose.
+    worn: Option<Arc<[Vec3]>>,
+    /// The configured energy, or what it becomes for a surface that is known.
+    energy: EnergyConfig,
     first_track: Option<Timestamp>,
     phase: Phase,
 }
@@ -61,6 +68,8 @@ impl Tracker {
             surface,
             search_surface,
             shape_known: false,
+            worn: None,
+            energy: config.energy,
             first_track: None,
             phase: Phase::Searching { since: None, last_try: None, last_seen: None },
             config,
@@ -84,7 +93,9 @@ impl Tracker {
 
     /// Starts anew with another person; what is known of the floor stays.
     pub fn forget_person(&mut self) {
-        self.shaped = ShapedSurface::new(&self.surface, [0.0; BETA_COUNT]);
+        self.worn = None;
+        self.energy = self.config.energy;
+        self.shaped = self.dressed(&self.surface, [0.0; BETA_COUNT]);
         self.shape = ShapeFit::new(Arc::clone(&self.surface));
         self.shape_known = false;
         self.first_track = None;
@@ -169,12 +180,7 @@ impl Tracker {
     }
 
     fn context<'a>(&'a self, predicted: Option<&'a Prediction>) -> Context<'a> {
-        Context {
-            energy: &self.config.energy,
-            predicted,
-            grounded: self.world.is_grounded(),
-            whole: true,
-        }
+        Context { energy: &self.energy, predicted, grounded: self.world.is_grounded(), whole: true }
     }
 
     fn lose(&mut self, now: Timestamp) -> Tracking {
@@ -210,4 +216,11 @@ fn tracked(found: &Aligned) -> Tracking {
         residual_rms_m: found.residual_rms_m,
         joint_confidence: found.joint_confidence,
     }
+}
+
+/// How much the drawn body and the picture differ, less what the sensor's noise alone makes them differ.
+fn beyond_noise_m(found: &Aligned, observation: &Observation) -> f32 {
+    /// The mean of a normal error's size, in standard deviations.
+    const MEAN_SIZE: f32 = 0.8;
+    found.agreement.error_m - MEAN_SIZE * observation.view.noise_m
 }

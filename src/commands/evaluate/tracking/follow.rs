@@ -2,16 +2,17 @@
 
 use std::sync::Arc;
 
-use effigy_capture::{Frame, FrameId, Timestamp};
+use effigy_capture::{Frame, FrameId, Intrinsics, Timestamp};
 use effigy_fusion::clean::Cleaner;
-use effigy_registration::{BodyModel, BodyParams, RegisteredFrame, Tracker};
-use effigy_sim_sensor::{SimulatedSensor, Truth};
+use effigy_registration::{BodyModel, RegisteredFrame, Tracker};
+use effigy_sim_sensor::{SimulatedSensor, StrangerTruth, Truth};
 
 use super::{
     Options,
     cpu_time::timed,
     loss::{Moment, Vanishing, losses_of},
     score::{CaseScores, FrameScore, Judge, State},
+    strangers::StrangerJudge,
     suite::{Case, Purpose},
 };
 
@@ -22,9 +23,8 @@ pub(super) fn follow(
     options: &Options,
 ) -> anyhow::Result<CaseScores> {
     let mut sensor = SimulatedSensor::new(&case.scenario, Arc::clone(body))?;
-    let truth = Truth::new(&case.scenario, Arc::clone(body))?;
     let calibration = effigy_capture::FrameSource::calibration(&sensor).clone();
-    let mut judge = Judge::new(body, calibration.depth.intrinsics);
+    let mut reality = Reality::new(case, body, calibration.depth.intrinsics)?;
     let mut chain = Chain {
         cleaner: Cleaner::new(calibration.clone(), options.clean.clone()),
         // Where the camera stands is not told: the floor is found as on any other recording.
@@ -41,11 +41,7 @@ pub(super) fn follow(
         let frame = exposure(&mut sensor, case, number as u64, moment)?;
         let (registered, milliseconds) = chain.process(&frame)?;
         let score = if moment.vanished.is_none() {
-            judge.score(
-                &registered,
-                &truth.at(FrameId(moment.content)),
-                milliseconds,
-            )
+            reality.score(&registered, FrameId(moment.content), milliseconds)
         } else {
             FrameScore::of_nobody(&registered, milliseconds)
         };
@@ -53,12 +49,50 @@ pub(super) fn follow(
         chain.recycle(registered);
     }
     scores.losses = losses_of(&moments, &scores.frames);
-    if matches!(case.purpose, Purpose::Accuracy | Purpose::Stillness) {
-        let betas = chain.tracker.betas();
-        let error_m = height_m(body, betas) - height_m(body, truth.person().betas);
-        scores.height_error_m = Some(error_m);
-    }
+    scores.height_error_m = reality.height_error_m(body, chain.tracker.betas());
+    reality.finish(&mut scores.frames);
     Ok(scores)
+}
+
+/// Whatever is true about the one who is followed.
+enum Reality<'a> {
+    Person { judge: Box<Judge<'a>>, truth: Box<Truth> },
+    Stranger(Box<StrangerJudge<'a>>),
+}
+
+impl<'a> Reality<'a> {
+    fn new(case: &Case, body: &'a Arc<BodyModel>, camera: Intrinsics) -> anyhow::Result<Self> {
+        let judge = Judge::new(body, camera);
+        if case.scenario.stranger.is_some() {
+            let truth = StrangerTruth::new(&case.scenario)?;
+            return Ok(Self::Stranger(Box::new(StrangerJudge::new(judge, truth))));
+        }
+        let truth = Box::new(Truth::new(&case.scenario, Arc::clone(body))?);
+        Ok(Self::Person { judge: Box::new(judge), truth })
+    }
+
+    fn score(&mut self, registered: &RegisteredFrame, content: FrameId, ms: f32) -> FrameScore {
+        match self {
+            Self::Person { judge, truth } => judge.score(registered, &truth.at(content), ms),
+            Self::Stranger(judge) => judge.score(registered, content, ms),
+        }
+    }
+
+    /// What can only be known after the last frame.
+    fn finish(&self, frames: &mut [FrameScore]) {
+        if let Self::Stranger(judge) = self {
+            judge.remove_offsets(frames);
+        }
+    }
+
+    fn height_error_m(&self, body: &BodyModel, betas: [f32; 10]) -> Option<f32> {
+        match self {
+            Self::Person { truth, .. } => {
+                Some(height_m(body, betas) - height_m(body, truth.person().betas))
+            }
+            Self::Stranger(_) => None,
+        }
+    }
 }
 
 /// What is timed: from a raw frame to its body.
@@ -122,6 +156,7 @@ impl FrameScore {
             milliseconds,
             present: false,
             state: State::of(&registered.tracking),
+            measured: [false; effigy_registration::smpl::JOINT_COUNT],
             observed: [false; effigy_registration::smpl::JOINT_COUNT],
             errors: None,
         }
@@ -130,7 +165,7 @@ impl FrameScore {
 
 /// From heel to crown, standing straight.
 fn height_m(body: &BodyModel, betas: [f32; 10]) -> f32 {
-    let vertices = body.shaped_vertices(&BodyParams { betas, ..BodyParams::ZERO }.betas);
+    let vertices = body.shaped_vertices(&betas);
     let heights = || vertices.iter().map(|vertex| vertex.y);
     heights().fold(f32::MIN, f32::max) - heights().fold(f32::MAX, f32::min)
 }

@@ -5,6 +5,7 @@ mod follow;
 mod loss;
 mod score;
 mod statistics;
+mod strangers;
 mod suite;
 mod table;
 

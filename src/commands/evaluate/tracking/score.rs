@@ -1,7 +1,10 @@
 //! One frame's tracked body against the true one, in the depth camera's space.
 
-use effigy_capture::{Intrinsics, Timestamp};
-use effigy_fusion::mesh::z_buffer::{Faces, Raster, Rasterizer};
+use effigy_capture::{Intrinsics, Rigid3, Timestamp};
+use effigy_fusion::mesh::{
+    TriangleMesh,
+    z_buffer::{Faces, Raster, Rasterizer},
+};
 use effigy_registration::{BodyModel, RegisteredFrame, Tracking, smpl::JOINT_COUNT};
 use effigy_sim_sensor::GroundTruth;
 use glam::Vec3;
@@ -29,7 +32,8 @@ pub(super) struct FrameScore {
     pub(super) milliseconds: f32,
     pub(super) present: bool,
     pub(super) state: State,
-    /// Of the joints the camera could see.
+    /// The joints that there is a truth about, and those of them that the camera could see.
+    pub(super) measured: [bool; JOINT_COUNT],
     pub(super) observed: [bool; JOINT_COUNT],
     /// Where a body was tracked.
     pub(super) errors: Option<BodyErrors>,
@@ -46,7 +50,8 @@ pub(super) enum State {
 #[derive(Clone, Debug)]
 pub(super) struct BodyErrors {
     pub(super) joints_mm: [f32; JOINT_COUNT],
-    pub(super) v2v_mm: f32,
+    /// `None` where the truth has another surface than SMPL's.
+    pub(super) v2v_mm: Option<f32>,
     pub(super) root_m: f32,
     /// Found minus true.
     pub(super) wrists_mm: [Vec3; 2],
@@ -102,6 +107,11 @@ impl<'a> Judge<'a> {
         Self { body, parts: body.part_labels(), camera, rasterizer }
     }
 
+    /// For a surface whose vertices these bones move most.
+    pub(super) fn with_parts(self, parts: Vec<u8>) -> Self {
+        Self { parts, ..self }
+    }
+
     pub(super) fn score(
         &mut self,
         registered: &RegisteredFrame,
@@ -113,9 +123,15 @@ impl<'a> Judge<'a> {
             milliseconds,
             present: true,
             state: State::of(&registered.tracking),
-            observed: self.observed(truth),
+            measured: [true; JOINT_COUNT],
+            observed: self.observed(&truth.clothed_in_world, truth.world_from_camera),
             errors: self.errors(registered, truth),
         }
+    }
+
+    /// Joints of the tracked body in its own world.
+    pub(super) fn joints(&self, registered: &RegisteredFrame) -> Option<[Vec3; JOINT_COUNT]> {
+        Some(self.body.pose(registered.params()?).joints)
     }
 
     fn errors(&self, registered: &RegisteredFrame, truth: &GroundTruth) -> Option<BodyErrors> {
@@ -134,7 +150,7 @@ impl<'a> Judge<'a> {
             .sum();
         Some(BodyErrors {
             joints_mm: std::array::from_fn(error_mm),
-            v2v_mm: 1e3 * v2v_sum_m / found.vertices.len() as f32,
+            v2v_mm: Some(1e3 * v2v_sum_m / found.vertices.len() as f32),
             root_m: joints[0].distance(real[0]),
             wrists_mm: [20, 21].map(|wrist| (joints[wrist] - real[wrist]) * 1e3),
             swapped: is_swapped(&joints, real),
@@ -142,9 +158,12 @@ impl<'a> Judge<'a> {
     }
 
     /// Which joints the camera could see: enough of the clothed surface that they move is in view.
-    fn observed(&mut self, truth: &GroundTruth) -> [bool; JOINT_COUNT] {
-        let camera_from_world = truth.world_from_camera.inverse();
-        let surface = &truth.clothed_in_world;
+    pub(super) fn observed(
+        &mut self,
+        surface: &TriangleMesh,
+        world_from_camera: Rigid3,
+    ) -> [bool; JOINT_COUNT] {
+        let camera_from_world = world_from_camera.inverse();
         let in_camera: Vec<Vec3> = surface
             .vertices
             .iter()
@@ -177,7 +196,7 @@ fn is_visible(raster: &Raster, camera: &Intrinsics, in_camera: Vec3) -> bool {
 }
 
 /// Whether hips, knees, shoulders and elbows would fit better with left and right exchanged.
-fn is_swapped(found: &[Vec3], real: &[Vec3]) -> bool {
+pub(super) fn is_swapped(found: &[Vec3], real: &[Vec3]) -> bool {
     const PAIRS: [[usize; 2]; 4] = [[1, 2], [4, 5], [16, 17], [18, 19]];
     let distance = |a: usize, b: usize| found[a].distance(real[b]);
     let straight: f32 = PAIRS

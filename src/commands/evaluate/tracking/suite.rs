@@ -1,13 +1,47 @@
 //! Who is followed, doing what, seen by which sensor.
 
+use std::path::PathBuf;
+
 use effigy_registration::motion::Routine;
-use effigy_sim_sensor::{MotionChoice, OutfitKind, Scenario, SensorPreset};
+use effigy_sim_sensor::{MotionChoice, OutfitKind, Scenario, SensorPreset, StrangerChoice};
 
 /// The people of the test split: nothing was ever tuned on them. Settings are tuned on people below 100.
 const TEST_PEOPLE: [u64; 3] = [101, 102, 103];
 
+/// Strangers are watched for as long as this.
+const STRANGER_SECS: f32 = 5.0;
 /// Of movement that losses interrupt; it repeats.
 const LOSS_SECS: f32 = 20.0;
+
+/// Seen from the repository.
+const DATA: &str = "../shared/data";
+/// Characters that know nothing of SMPL: whose they are, and their files. Nothing was ever tuned on them.
+const STRANGERS: [(&str, &[&str]); 2] = [
+    (
+        "rocketbox",
+        &[
+            "rocketbox/glb/Male_Adult_01.glb",
+            "rocketbox/glb/Female_Adult_05.glb",
+        ],
+    ),
+    (
+        "quaternius",
+        &[
+            "quaternius-animated/Smooth_Male_Casual.glb",
+            "quaternius-animated/Smooth_Female_Casual.glb",
+        ],
+    ),
+];
+/// What strangers do: recorded people, and clips that some files bring along.
+const STRANGERS_BVH: [&str; 3] = [
+    "mocap-cmu/02_01_walk.bvh",
+    "mocap-cmu/jumping_jacks.bvh",
+    "mocap-animated-drawings/wave_hello.bvh",
+];
+const STRANGERS_CLIPS: [(&str, &[&str]); 2] = [
+    ("Smooth_Male", &["Man_Walk", "Man_Clapping"]),
+    ("Smooth_Female", &["Female_Walk", "Female_Punch"]),
+];
 
 /// Who and what is evaluated.
 #[derive(Clone, Debug)]
@@ -22,6 +56,8 @@ pub(crate) struct Suite {
     pub(crate) stand_secs: f32,
     /// Losses of each person in each outfit before each sensor.
     pub(crate) losses: usize,
+    /// Where the data sets are that strangers and their movements come from.
+    pub(crate) data: PathBuf,
 }
 
 /// One person doing one thing.
@@ -45,26 +81,44 @@ pub(crate) enum Purpose {
 
 impl Case {
     pub(crate) fn name(&self) -> String {
-        let Scenario { sensor, outfit, seed, .. } = &self.scenario;
+        let Scenario { sensor, seed, .. } = &self.scenario;
         format!(
             "{} {} {} person {seed}",
             sensor.name(),
-            outfit_name(*outfit),
+            self.wears(),
             self.motion_name()
         )
+    }
+
+    /// The outfit, or whose character it is.
+    pub(crate) fn wears(&self) -> &'static str {
+        match &self.scenario.stranger {
+            None => self.scenario.outfit.name(),
+            Some(stranger) => {
+                let named = |name: &&&str| stranger.path.to_string_lossy().contains(**name);
+                STRANGERS
+                    .iter()
+                    .map(|(name, _)| name)
+                    .find(named)
+                    .unwrap_or(&"stranger")
+            }
+        }
     }
 
     pub(crate) fn motion_name(&self) -> String {
         match (&self.scenario.motion, self.purpose) {
             (_, Purpose::Losses(_)) => "losses".to_owned(),
+            _ if self.clip().is_some() => self.clip().unwrap_or_default().to_owned(),
             (MotionChoice::Routine(routine), _) => routine.name().to_owned(),
-            (MotionChoice::Bvh(path) | MotionChoice::File(path), _) => path.display().to_string(),
+            (MotionChoice::Bvh(path) | MotionChoice::File(path), _) => path
+                .file_stem()
+                .map_or_else(String::new, |stem| stem.to_string_lossy().into_owned()),
         }
     }
-}
 
-pub(crate) fn outfit_name(outfit: OutfitKind) -> &'static str {
-    outfit.name()
+    fn clip(&self) -> Option<&str> {
+        self.scenario.stranger.as_ref()?.clip.as_deref()
+    }
 }
 
 impl Suite {
@@ -86,6 +140,7 @@ impl Suite {
             most_secs: 8.0,
             stand_secs: 7.0,
             losses: 5,
+            data: PathBuf::from(DATA),
         }
     }
 
@@ -101,7 +156,7 @@ impl Suite {
         }
     }
 
-    /// Every person in every outfit before every sensor, doing everything.
+    /// Every person in every outfit before every sensor, doing everything; then strangers.
     pub(crate) fn cases(&self) -> Vec<Case> {
         let mut cases = Vec::new();
         for &sensor in &self.sensors {
@@ -112,7 +167,55 @@ impl Suite {
                 }
             }
         }
+        // Whoever tunes on other people has no business with strangers.
+        if self
+            .people
+            .iter()
+            .all(|person| TEST_PEOPLE.contains(person))
+        {
+            self.strangers(&mut cases);
+        }
         cases
+    }
+
+    /// Characters of other makers, moved by recordings and by clips of their own; none without the data sets.
+    fn strangers(&self, cases: &mut Vec<Case>) {
+        for &sensor in &self.sensors {
+            for (_, files) in STRANGERS {
+                for file in files
+                    .iter()
+                    .map(|file| self.data.join(file))
+                    .filter(|file| file.exists())
+                {
+                    let mut case = |motion: MotionChoice, clip: Option<&str>| {
+                        let clip = clip.map(str::to_owned);
+                        let stranger = StrangerChoice { path: file.clone(), clip, height_m: None };
+                        let scenario = Scenario {
+                            sensor,
+                            motion,
+                            seconds: self.most_secs.min(STRANGER_SECS),
+                            stranger: Some(stranger),
+                            ..Scenario::default()
+                        };
+                        cases.push(Case {
+                            suite: "strangers",
+                            scenario,
+                            purpose: Purpose::Accuracy,
+                        });
+                    };
+                    for bvh in STRANGERS_BVH.map(|bvh| self.data.join(bvh)) {
+                        case(MotionChoice::Bvh(bvh), None);
+                    }
+                    let name = file.to_string_lossy();
+                    let own = STRANGERS_CLIPS
+                        .iter()
+                        .find(|(start, _)| name.contains(start));
+                    for clip in own.iter().flat_map(|(_, clips)| *clips) {
+                        case(MotionChoice::Routine(Routine::Stand), Some(*clip));
+                    }
+                }
+            }
+        }
     }
 
     /// One person's movements, a stand, and losses.

@@ -5,9 +5,9 @@ use std::fmt;
 use serde::Serialize;
 
 use super::{
-    score::{BodyErrors, CaseScores, FrameScore},
+    score::{BodyErrors, CaseScores, FrameScore, State},
     statistics::{mean, percentile, root_mean_square, share},
-    suite::{Case, Purpose, outfit_name},
+    suite::{Case, Purpose},
 };
 
 /// A joint within this of the true one is a hit.
@@ -50,6 +50,7 @@ struct Row {
     false_tracked_fraction: Option<f64>,
     jitter_mm: Option<f64>,
     height_error_mm: Option<f64>,
+    /// Processor time of cleaning and tracking where a body was followed.
     ms_p50: Option<f64>,
     ms_p99: Option<f64>,
     /// Of frames in which a body was found.
@@ -103,11 +104,7 @@ struct Key {
 
 impl Key {
     fn of(case: &Case) -> Self {
-        Self {
-            suite: case.suite,
-            sensor: case.scenario.sensor.name(),
-            outfit: outfit_name(case.scenario.outfit),
-        }
+        Self { suite: case.suite, sensor: case.scenario.sensor.name(), outfit: case.wears() }
     }
 }
 
@@ -137,13 +134,9 @@ impl Row {
             .filter(|(case, _)| !matches!(case.purpose, Purpose::Losses(_)))
             .flat_map(|(_, scores)| &scores.frames)
             .collect();
-        let all: Vec<&FrameScore> = cases
-            .iter()
-            .flat_map(|(_, scores)| &scores.frames)
-            .collect();
         row.with_accuracy(&watched)
             .with_losses(cases)
-            .with_times(&all)
+            .with_times(cases)
     }
 
     fn with_accuracy(self, frames: &[&FrameScore]) -> Self {
@@ -151,9 +144,14 @@ impl Row {
         let observed = || frames.iter().flat_map(|frame| observed_mm(frame));
         let hits = |mm: f32| mm < HIT_MM;
         Self {
-            mpjpe_mm: mean(errors().flat_map(|errors| errors.joints_mm)),
+            mpjpe_mm: mean(
+                frames
+                    .iter()
+                    .flat_map(|frame| all_mm(frame))
+                    .filter(|mm| mm.is_finite()),
+            ),
             mpjpe_observed_mm: mean(observed().filter(|mm| mm.is_finite())),
-            v2v_mm: mean(errors().map(|errors| errors.v2v_mm)),
+            v2v_mm: mean(errors().filter_map(|errors| errors.v2v_mm)),
             p99_mm: percentile(observed().filter(|mm| mm.is_finite()), 0.99),
             hit_rate_100mm: share(observed(), hits),
             hit_rate_all_100mm: share(frames.iter().flat_map(|frame| all_mm(frame)), hits),
@@ -179,21 +177,30 @@ impl Row {
             reacquire_p95_secs: percentile(back(), 0.95),
             reacquired_fraction: share(back(), |secs| secs <= REACQUIRED_WITHIN_SECS),
             false_tracked_fraction: share(lost_frames, |frame: &FrameScore| {
-                frame.state == super::score::State::Tracked
+                frame.state == State::Tracked
             }),
             ..self
         }
     }
 
-    fn with_times(self, frames: &[&FrameScore]) -> Self {
-        let found = frames.windows(2).filter(|pair| {
-            let tracked = |frame: &FrameScore| frame.state == super::score::State::Tracked;
-            !tracked(pair[0]) && tracked(pair[1])
-        });
+    fn with_times(self, cases: &[(&Case, &CaseScores)]) -> Self {
+        let (mut following, mut finding) = (Vec::new(), Vec::new());
+        for (_, scores) in cases {
+            let mut followed = false;
+            for frame in &scores.frames {
+                let tracked = frame.state == State::Tracked;
+                match (followed, tracked) {
+                    (true, true) => following.push(frame.milliseconds),
+                    (false, true) => finding.push(frame.milliseconds),
+                    (_, false) => {}
+                }
+                followed = tracked;
+            }
+        }
         Self {
-            ms_p50: percentile(frames.iter().map(|frame| frame.milliseconds), 0.5),
-            ms_p99: percentile(frames.iter().map(|frame| frame.milliseconds), 0.99),
-            find_ms_p95: percentile(found.map(|pair| pair[1].milliseconds), 0.95),
+            ms_p50: percentile(following.iter().copied(), 0.5),
+            ms_p99: percentile(following, 0.99),
+            find_ms_p95: percentile(finding, 0.95),
             ..self
         }
     }
@@ -201,18 +208,25 @@ impl Row {
 
 /// Errors of the joints the camera could see; infinite where there is no track.
 fn observed_mm(frame: &FrameScore) -> Vec<f32> {
-    let joints = all_mm(frame).into_iter().zip(frame.observed);
-    joints
-        .filter(|(_, observed)| *observed)
-        .map(|(mm, _)| mm)
-        .collect()
+    errors_mm(frame, &frame.observed)
 }
 
+/// Errors of all joints there is a truth about.
 fn all_mm(frame: &FrameScore) -> Vec<f32> {
-    match &frame.errors {
-        Some(errors) => errors.joints_mm.to_vec(),
-        None => vec![f32::INFINITY; frame.observed.len()],
-    }
+    errors_mm(frame, &frame.measured)
+}
+
+fn errors_mm(frame: &FrameScore, which: &[bool]) -> Vec<f32> {
+    let error = |joint: usize| {
+        frame
+            .errors
+            .as_ref()
+            .map_or(f32::INFINITY, |errors| errors.joints_mm[joint])
+    };
+    (0..which.len())
+        .filter(|&joint| which[joint])
+        .map(error)
+        .collect()
 }
 
 /// How far each wrist's error strays from its mean within a second, in the last seconds of a stand: what a steady
