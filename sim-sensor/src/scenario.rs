@@ -228,6 +228,13 @@ impl Scenario {
         )?;
         let late = (0.0..=1.0).contains(&self.late_share);
         check(late, "late_share", self.late_share.to_string(), "0 to 1")?;
+        let height_m = self.stranger.as_ref().and_then(|choice| choice.height_m);
+        check(
+            height_m.is_none_or(|height_m| (0.3..=3.0).contains(&height_m)),
+            "stranger.height_m",
+            format!("{height_m:?}"),
+            "0.3 to 3 metres",
+        )?;
         let betas = self
             .betas
             .is_none_or(|b| b.iter().all(|beta| beta.abs() <= 5.0));

@@ -336,3 +336,43 @@ fn unknown_clips_are_answered_with_the_known_ones() {
         "{error}"
     );
 }
+
+/// Neither a cut nor a flipped byte makes the reader panic; what it still reads, it can move.
+#[test]
+fn damaged_files_are_refused_or_read_but_never_panic() {
+    let Some(path) = data("cesium-man/CesiumMan.glb") else {
+        return;
+    };
+    let whole = fs::read(path).unwrap();
+    let random = crate::random::Randomness::new(9, 0, 0);
+    let mut refused = 0;
+    for damage in 0..96 {
+        let mut bytes = whole.clone();
+        let at =
+            |n: u64, most: usize| (random.uniform(damage * 8 + n) * most as f32) as usize % most;
+        if damage % 4 == 0 {
+            bytes.truncate(at(0, whole.len()));
+        } else {
+            // Two of three in the JSON, where damage does most.
+            let most = if damage % 4 == 3 { whole.len() } else { 12_000 };
+            for n in 0..3 {
+                bytes[at(2 * n, most)] = at(2 * n + 1, 256) as u8;
+            }
+        }
+        let damaged = written("damaged.glb", &bytes);
+        match Character::read(&damaged, None) {
+            Ok(character) => {
+                let mesh = character.posed(&[Vec3::ZERO; JOINT_COUNT], Vec3::ZERO);
+                assert!(mesh.indices_are_valid(), "damage {damage}");
+                for clip in &character.clips {
+                    assert!(character.at(clip, 0.4 * clip.secs).0.indices_are_valid());
+                }
+            }
+            Err(error) => {
+                refused += 1;
+                assert!(error.to_string().contains("damaged.glb"), "{error}");
+            }
+        }
+    }
+    assert!(refused > 36, "most damage is noticed: {refused} of 96");
+}
