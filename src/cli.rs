@@ -56,7 +56,9 @@ pub(crate) enum Command {
     )]
     Train(TrainArgs),
     /// Measure how good a part of the program is, on a fixed suite
-    #[command(after_help = "Example: effigy evaluate tracking --quick --json tracking.json")]
+    #[command(
+        after_help = "Example: effigy evaluate tracking --quick --json tracking.json\n         effigy evaluate --data data/cape-like --md table.md"
+    )]
     Evaluate(EvaluateArgs),
 }
 
@@ -306,9 +308,41 @@ pub(crate) struct TrainPriorArgs {
 }
 
 #[derive(Debug, Args)]
+#[command(args_conflicts_with_subcommands = true)]
 pub(crate) struct EvaluateArgs {
     #[command(subcommand)]
-    pub(crate) what: EvaluateWhat,
+    pub(crate) what: Option<EvaluateWhat>,
+    #[command(flatten)]
+    pub(crate) avatar: EvaluateAvatarArgs,
+}
+
+/// Avatars of a data set's test people, by a paper's protocol.
+#[derive(Debug, Args)]
+pub(crate) struct EvaluateAvatarArgs {
+    /// The data set (`effigy dataset make --preset cape-like`)
+    #[arg(long, value_name = "DIR")]
+    pub(crate) data: Option<PathBuf>,
+    /// How avatars are judged
+    #[arg(long, value_enum, default_value = "metavatar")]
+    pub(crate) protocol: Protocol,
+    /// Write all figures here
+    #[arg(long, value_name = "FILE")]
+    pub(crate) json: Option<PathBuf>,
+    /// Write the table here
+    #[arg(long, value_name = "FILE")]
+    pub(crate) md: Option<PathBuf>,
+    /// One person, two frames a task
+    #[arg(long)]
+    pub(crate) quick: bool,
+    /// Settings of the stages (TOML); what it does not name keeps its default
+    #[arg(long, value_name = "FILE")]
+    pub(crate) config: Option<PathBuf>,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(crate) enum Protocol {
+    /// Eight single views of a test person, then other frames (the seed paper's section 4)
+    Metavatar,
 }
 
 #[derive(Debug, Subcommand)]

@@ -1,7 +1,7 @@
 //! The whole hypernetwork: encoder, one head a layer, and the meta-learned field they start from.
 
 use effigy_registration::smpl::BodyIdentity;
-use rand::Rng;
+use rand::{Rng, SeedableRng as _, rngs::StdRng};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -96,6 +96,13 @@ impl HyperNetwork {
         }
         let meta = meta.parameters().to_vec();
         Self { config, meta, encoder, heads, provenance: Provenance::default() }
+    }
+
+    /// As it is before any learning.
+    pub fn untrained(config: HyperConfig, seed: u64) -> Self {
+        let mut rng = StdRng::seed_from_u64(seed);
+        let meta = SirenField::init(config.field, &mut rng);
+        Self::init(config, &meta, &mut rng)
     }
 
     pub fn config(&self) -> HyperConfig {

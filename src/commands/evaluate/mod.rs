@@ -1,16 +1,17 @@
 //! `effigy evaluate`: how good a part of the program is, on a fixed suite, as one file of numbers.
 
+mod avatar;
 pub(crate) mod tracking;
 
 use std::fs;
 
-use anyhow::Context as _;
+use anyhow::{Context as _, bail};
 use effigy_registration::smpl::builtin;
 use serde::Serialize;
 
 use self::tracking::{Suite, Table};
 use crate::{
-    cli::{EvaluateArgs, EvaluateTrackingArgs, EvaluateWhat},
+    cli::{EvaluateArgs, EvaluateTrackingArgs, EvaluateWhat, Protocol},
     interrupt,
     machine::Machine,
     pipeline::settings::Settings,
@@ -21,8 +22,12 @@ use crate::{
 const SCHEMA: &str = "effigy.evaluate.tracking/1";
 
 pub(crate) fn run(args: &EvaluateArgs) -> anyhow::Result<()> {
-    match &args.what {
-        EvaluateWhat::Tracking(args) => evaluate_tracking(args),
+    match (&args.what, &args.avatar.data, args.avatar.protocol) {
+        (Some(EvaluateWhat::Tracking(args)), _, _) => evaluate_tracking(args),
+        (None, Some(data), Protocol::Metavatar) => avatar::run(&args.avatar, data),
+        (None, None, Protocol::Metavatar) => {
+            bail!("name the data set with --data, or a suite: `effigy evaluate tracking`")
+        }
     }
 }
 
