@@ -9,9 +9,7 @@ impl Wear {
     /// How far outside the minimal body each point of every garment is, in metres; negative inside.
     pub fn clearances_m(&self) -> Vec<f32> {
         let person = self.person();
-        let posed = person
-            .body
-            .pose(&person.params(&self.pose().theta, self.pose().trans));
+        let posed = person.minimal_posed(&self.pose().theta, self.pose().trans);
         let tree = ClosestPoint::new(&posed.vertices, &person.body.triangles)
             .expect("a posed body is finite");
         self.points()

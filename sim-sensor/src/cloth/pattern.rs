@@ -138,7 +138,7 @@ impl ClothKind {
             Self::PoloTrousers => vec![tailor.slim_trousers(), tailor.polo()],
             Self::HoodieTrousers => vec![tailor.slim_trousers(), tailor.hoodie()],
             Self::BlazerTrousers => {
-                let close = Tailor { fit: 0.3, ..tailor };
+                let close = Tailor { fit: 0.45, ..tailor };
                 vec![close.undershirt(), tailor.slim_trousers(), tailor.blazer()]
             }
             Self::Skirt => {
@@ -292,9 +292,9 @@ impl Tailor {
             hem: Some(self.random.between(7, 0.26, 0.36)),
             front: Front::Open,
             ease: Ease {
-                trunk_m: self.by_fit(0.026, 0.042),
-                limb_m: self.by_fit(0.018, 0.028),
-                end_m: self.by_fit(0.018, 0.026),
+                trunk_m: self.by_fit(0.030, 0.050),
+                limb_m: self.by_fit(0.022, 0.036),
+                end_m: self.by_fit(0.020, 0.030),
                 hem_m: self.by_fit(0.035, 0.055),
                 flare: 0.15,
                 ribbed: false,

@@ -1,8 +1,8 @@
 //! Simulated people: a shape, an outfit on the body's own topology, and how both look in a pose.
 //!
 //! Clothes are displacements of the zero-pose surface: outwards by an ease, more where gravity pulls the cloth
-//! away from the limb, in folds where joints bend. A cloth simulation may later take the place of
-//! [`Person::clothed_zero_pose`]; nothing else depends on how the surface came about.
+//! away from the limb, in folds where joints bend. Clothes that are simulated are worn over a person with shoes
+//! and hair only: see [`crate::cloth`].
 
 use std::sync::Arc;
 
