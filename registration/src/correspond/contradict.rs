@@ -14,8 +14,8 @@ pub(crate) struct Contradictions {
     pub(crate) pushes: Vec<Push>,
 }
 
-/// A measured surface this much nearer than a vertex hides it.
-const OCCLUDER_M: f32 = 0.10;
+/// Whatever is measured less than this behind a vertex hides it, or is the very limb, cut off the mask by mistake.
+const BEHIND_M: f32 = 0.10;
 /// Smaller steps in front of the depth are left to the matches.
 const PUSH_FROM_M: f32 = 0.02;
 /// And so is what may be noise: it would push the body away from the camera, and nothing would push it back.
@@ -54,7 +54,7 @@ pub(crate) fn contradictions(
         if cell.seen == Seen::Gap || position.y < view.ground_m {
             continue;
         }
-        if cell.seen == Seen::Other && cell.depth_m < in_camera.z - OCCLUDER_M {
+        if cell.seen == Seen::Other && cell.depth_m < in_camera.z + BEHIND_M {
             continue;
         }
         let place = view.pinhole.project(in_camera);

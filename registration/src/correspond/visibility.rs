@@ -35,8 +35,8 @@ pub(crate) struct Renderer {
 /// Worse than this is simply wrong.
 const WORST_M: f32 = 0.10;
 const CLOSE_M: f32 = 0.06;
-/// Something nearer than the body by this much hides it.
-const OCCLUDER_M: f32 = 0.10;
+/// Whatever is measured less than this behind the body hides it, or is the very limb, cut off the mask by mistake.
+const BEHIND_M: f32 = 0.10;
 /// Vertices this far behind the drawn surface are hidden by it; coarse triangles cut corners by less.
 const HIDDEN_M: f32 = 0.03;
 /// Cosine between normal and ray below which a vertex is seen too obliquely to be matched.
@@ -133,7 +133,7 @@ struct Tally {
 impl Tally {
     fn add(&mut self, seen: Seen, depth_m: f32, drawn_m: f32) {
         let drawn = drawn_m > 0.0;
-        let hidden = seen == Seen::Gap || (seen == Seen::Other && depth_m < drawn_m - OCCLUDER_M);
+        let hidden = seen == Seen::Gap || (seen == Seen::Other && depth_m < drawn_m + BEHIND_M);
         match (seen == Seen::Person, drawn) {
             (true, true) => {
                 let difference_m = (depth_m - drawn_m).abs();
