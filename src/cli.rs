@@ -331,6 +331,9 @@ pub(crate) struct EvaluateAvatarArgs {
     /// Write the table here
     #[arg(long, value_name = "FILE")]
     pub(crate) md: Option<PathBuf>,
+    /// Frames of each task for each person in each outfit
+    #[arg(long, default_value_t = 20)]
+    pub(crate) test_frames: usize,
     /// One person, two frames a task
     #[arg(long)]
     pub(crate) quick: bool,

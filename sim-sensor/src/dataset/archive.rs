@@ -2,7 +2,7 @@
 //!
 //! Arrays: `plan` (JSON as bytes), `betas` [10], `rest_joints` [24, 3], `bones` and `weights` [V, 4], `layers` [V],
 //! `triangles` [T, 3], `mean` [V, 3] (star pose, metres), and for the F frames `id` [F], `theta` [F, 24, 3], `trans`
-//! [F, 3], `offset` [F, V, 3] (16-bit steps of `offset_step_m` from `mean`) and `visible` [F, T].
+//! and `params_trans` [F, 3], `offset` [F, V, 3] (16-bit steps of `offset_step_m` from `mean`) and `visible` [F, T].
 
 use std::io::{Cursor, Read as _, Write as _};
 
@@ -64,6 +64,10 @@ pub(super) fn pack(sequence: &Sequence, offset_step_m: f32) -> Result<Vec<u8>, S
         &[f, 3],
         frames.iter().flat_map(|frame| frame.trans.to_array()),
     )?;
+    let params_trans = frames
+        .iter()
+        .flat_map(|frame| frame.params_trans.to_array());
+    zip.add("params_trans", &[f, 3], params_trans)?;
     let visible = frames.iter().flat_map(|frame| &frame.visible);
     zip.add("visible", &[f, t], visible.map(|&seen| u8::from(seen)))?;
     let mut offsets = Vec::with_capacity(frames.len() * vertices * 3);
@@ -112,6 +116,7 @@ pub(super) fn unpack(bytes: &[u8]) -> Result<Sequence, String> {
     let count = ids.len() as u64;
     let theta = zip.vectors("theta", &[count, 24, 3])?;
     let trans = zip.vectors("trans", &[count, 3])?;
+    let params_trans = zip.vectors("params_trans", &[count, 3])?;
     let visible = zip.array::<u8>("visible", &[count, triangle_count])?;
     let offsets = zip.array::<i16>("offset", &[count, vertices, 3])?;
     let frames = ids.iter().enumerate().map(|(f, &id)| {
@@ -123,6 +128,7 @@ pub(super) fn unpack(bytes: &[u8]) -> Result<Sequence, String> {
             id: FrameId(id),
             theta: std::array::from_fn(|joint| theta[f * JOINT_COUNT + joint]),
             trans: trans[f],
+            params_trans: params_trans[f],
             star: offsets
                 .zip(&mean)
                 .map(|(offset, mean)| *mean + offset * step)

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use crate::{
     person::OutfitKind,
     random::Randomness,
-    scenario::{MotionChoice, Noise, Scenario},
+    scenario::{Likeness, MotionChoice, Noise, Scenario},
 };
 
 /// What a data set is for.
@@ -246,6 +246,8 @@ fn sequence(seed: u64, wearer: Wearer, action: Routine, role: Role, frames: u32)
         action: action_name.to_owned(),
         scenario: Scenario {
             seed: who,
+            // As real people: the body model does not fit them to the last millimetre.
+            likeness: Likeness::Individual,
             motion: MotionChoice::Routine(action),
             outfit,
             seconds: frames as f32 / RATE_HZ,

@@ -32,7 +32,10 @@ pub struct SequenceFrame {
     /// In the scenario.
     pub id: FrameId,
     pub theta: [Vec3; JOINT_COUNT],
+    /// Of the person's own body, whose zero-pose joints are the sequence's.
     pub trans: Vec3,
+    /// Of the body model that comes nearest: its pelvis lies on the person's.
+    pub params_trans: Vec3,
     /// The outer surface of this pose in star pose, correctives and folds included.
     pub star: Vec<Vec3>,
     /// Which triangles can be seen from outside.
@@ -56,9 +59,10 @@ impl Sequence {
         Some(gathered.finish(plan.clone(), truth))
     }
 
+    /// The body model that comes nearest to the person.
     pub fn params(&self, frame: usize) -> BodyParams {
-        let SequenceFrame { theta, trans, .. } = self.frames[frame];
-        BodyParams { betas: self.betas, theta, trans }
+        let SequenceFrame { theta, params_trans, .. } = self.frames[frame];
+        BodyParams { betas: self.betas, theta, trans: params_trans }
     }
 
     /// What can be seen from outside, in star pose, with the normals of that surface.
@@ -133,15 +137,29 @@ struct Gathered {
 
 impl Gathered {
     fn add(&mut self, truth: GroundTruth) {
-        let GroundTruth { id, params, clothed_in_world, clothed_canonical, in_cloth, .. } = truth;
+        let GroundTruth {
+            id,
+            params,
+            clothed_in_world,
+            clothed_canonical,
+            in_cloth,
+            minimal,
+            rest_joints,
+            ..
+        } = truth;
         if let Some(cloth) = in_cloth
             && self.frames.is_empty()
         {
             (self.weights, self.layers) = (cloth.weights, cloth.layers);
         }
-        let (theta, trans) = (params.theta, params.trans);
-        let frame =
-            SequenceFrame { id, theta, trans, star: clothed_canonical, visible: Vec::new() };
+        let frame = SequenceFrame {
+            id,
+            theta: params.theta,
+            trans: minimal.joints[0] - rest_joints[0],
+            params_trans: params.trans,
+            star: clothed_canonical,
+            visible: Vec::new(),
+        };
         self.frames.push((frame, clothed_in_world.triangles));
     }
 

@@ -26,8 +26,7 @@ use crate::{
 /// Changes when a key changes its meaning.
 const SCHEMA: &str = "effigy.evaluate.metavatar/1";
 
-/// Test frames of each task, for each person in each outfit.
-const TEST_FRAMES: usize = 20;
+/// Of a quick look.
 const QUICK_TEST_FRAMES: usize = 2;
 
 #[derive(Serialize)]
@@ -70,13 +69,13 @@ pub(super) fn run(args: &EvaluateAvatarArgs, data: &Path) -> anyhow::Result<()> 
     let tests = if args.quick {
         QUICK_TEST_FRAMES
     } else {
-        TEST_FRAMES
+        args.test_frames
     };
     let methods = Method::ALL;
     let progress = Progress::new("evaluating", Some((people.len() * methods.len()) as u64));
     let mut rows = Vec::new();
     let mut done = 0;
-    for entries in &people {
+    for entries in people.iter().take_while(|_| !interrupt::requested()) {
         let counts = (settings.keyframes.count, tests);
         let subject = Subject::load(&dataset, entries, counts, &settings)?;
         for method in methods {
