@@ -1,6 +1,6 @@
 //! From a raw frame to a tracked body: cleaning and tracking, timed.
 
-use std::{sync::Arc, time::Duration};
+use std::{collections::VecDeque, sync::Arc, time::Duration};
 
 use anyhow::Context as _;
 use effigy_capture::{Calibration, Frame};
@@ -13,7 +13,12 @@ pub(crate) struct TrackStage {
     cleaner: Cleaner,
     tracker: Tracker,
     clock: Clock,
+    /// The latest frames: once nobody else holds one, its memory serves the next.
+    recent: VecDeque<Arc<RegisteredFrame>>,
 }
+
+/// By then drivers and windows are done with a frame.
+const RECENT: usize = 3;
 
 /// A tracked frame and what it took.
 pub(crate) struct TrackedFrame {
@@ -35,6 +40,7 @@ impl TrackStage {
             cleaner: Cleaner::new(calibration.clone(), settings.clean.clone()),
             tracker: Tracker::new(body, camera, settings.track.clone(), world_from_camera),
             clock,
+            recent: VecDeque::new(),
         }
     }
 
@@ -44,6 +50,7 @@ impl TrackStage {
     }
 
     pub(crate) fn process(&mut self, frame: &Frame) -> anyhow::Result<TrackedFrame> {
+        self.recycle();
         let start = self.clock.now();
         let clean = self
             .cleaner
@@ -51,10 +58,21 @@ impl TrackStage {
             .with_context(|| format!("frame {}", frame.id.0))?;
         let cleaned = self.clock.now();
         let registered = Arc::new(self.tracker.process(Arc::new(clean)));
+        self.recent.push_back(Arc::clone(&registered));
         Ok(TrackedFrame {
             registered,
             clean_took: cleaned.saturating_sub(start),
             track_took: self.clock.now().saturating_sub(cleaned),
         })
+    }
+    fn recycle(&mut self) {
+        while self.recent.len() >= RECENT {
+            let frame = self.recent.pop_front().map(Arc::try_unwrap);
+            if let Some(Ok(frame)) = frame
+                && let Ok(clean) = Arc::try_unwrap(frame.clean)
+            {
+                self.cleaner.recycle(clean);
+            }
+        }
     }
 }
