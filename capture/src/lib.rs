@@ -10,7 +10,6 @@ pub mod error;
 pub mod frame;
 pub mod image;
 pub mod import;
-pub mod queue;
 pub mod recording;
 pub mod replay;
 pub mod source;
