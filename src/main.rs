@@ -8,6 +8,7 @@
 
 mod cli;
 mod commands;
+mod files;
 mod interrupt;
 mod machine;
 mod pipeline;

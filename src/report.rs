@@ -1,11 +1,10 @@
 //! `report.json`: what a run measured. Keys are explained in `docs/report.md`.
 
-use std::{collections::BTreeMap, fmt, fs, path::Path};
+use std::{collections::BTreeMap, fmt, path::Path};
 
-use anyhow::Context as _;
 use serde::Serialize;
 
-use crate::machine::Machine;
+use crate::{files, machine::Machine};
 
 /// Changes when a key changes its meaning.
 pub(crate) const SCHEMA: &str = "effigy.report/1";
@@ -98,13 +97,7 @@ pub(crate) struct SurfaceScores {
 
 impl Report {
     pub(crate) fn write(&self, path: &Path) -> anyhow::Result<()> {
-        let text = serde_json::to_string_pretty(self).context("a report is plain numbers")?;
-        fs::write(path, text + "\n").with_context(|| {
-            format!(
-                "{}: cannot write the report; is the folder there and writable?",
-                path.display()
-            )
-        })
+        files::write_json(path, self)
     }
 }
 
@@ -198,32 +191,28 @@ impl fmt::Display for Latency {
 }
 
 impl SurfaceScores {
-    fn has_figures(&self) -> bool {
-        let figures = [
-            self.observed_mm,
-            self.d_p_cm,
-            self.d_f_cm,
-            self.nc,
-            self.p2s_mm,
-        ];
-        figures.iter().any(Option::is_some)
-    }
-}
-
-impl fmt::Display for SurfaceScores {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let figures = [
+    /// Name, value and unit of each.
+    fn figures(&self) -> [(&'static str, Option<f64>, &'static str); 5] {
+        [
             ("observed", self.observed_mm, "mm"),
             ("D_p", self.d_p_cm, "cm"),
             ("D_f", self.d_f_cm, "cm"),
             ("NC", self.nc, ""),
             ("P2S", self.p2s_mm, "mm"),
-        ];
-        let known = figures
-            .iter()
-            .filter_map(|(name, value, unit)| Some((name, (*value)?, unit)));
-        for (name, value, unit) in known {
-            write!(f, "{name} {value:.3} {unit}  ")?;
+        ]
+    }
+
+    fn has_figures(&self) -> bool {
+        self.figures().iter().any(|(_, value, _)| value.is_some())
+    }
+}
+
+impl fmt::Display for SurfaceScores {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (name, value, unit) in self.figures() {
+            if let Some(value) = value {
+                write!(f, "{name} {value:.3} {unit}  ")?;
+            }
         }
         Ok(())
     }

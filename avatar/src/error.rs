@@ -60,10 +60,6 @@ pub enum AvatarError {
     TensorNotFinite { name: String, index: usize },
     #[error("{path}: checkpoint cannot be used: {what}; delete it to start anew")]
     Checkpoint { path: PathBuf, what: String },
-    #[error("cannot start the fine-tuning thread: {0}")]
-    Thread(std::io::Error),
-    #[error("the fine-tuning thread panicked; its message is on standard error")]
-    FineTunePanicked,
     #[error("fine-tuning needs at least one keyframe, got none")]
     NoKeyframes,
     #[error(

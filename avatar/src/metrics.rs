@@ -29,13 +29,9 @@ pub fn measured_vertices(weights: &[VertexWeights], triangles: &[[u32; 3]]) -> V
     for &vertex in triangles.iter().flatten() {
         used[vertex as usize] = true;
     }
-    let on_measured_bone = weights.iter().map(|weights| {
-        let largest = (0..4)
-            .rev()
-            .max_by(|&a, &b| weights.weights[a].total_cmp(&weights.weights[b]))
-            .expect("there are four slots");
-        MEASURED_BONES.contains(&weights.bones[largest])
-    });
+    let on_measured_bone = weights
+        .iter()
+        .map(|weights| MEASURED_BONES.contains(&weights.main_bone()));
     on_measured_bone
         .zip(used)
         .map(|(on, used)| on && used)

@@ -9,7 +9,7 @@ use effigy_fusion::{
     CleanConfig, CleanFrame, Cleaner, FusionError, TriangleMesh, clean::PersonVisibility,
     mesh::primitives::cuboid,
 };
-use glam::vec3;
+use glam::{Vec3, vec3};
 use scene::{
     AZURE, CAMERA, CAMERA_HEIGHT_M, D435, View, at, calibration, expose, figure, render, room,
 };
@@ -238,4 +238,29 @@ fn a_frame_of_another_size_is_refused_with_both_sizes() {
             .to_string()
             .contains(&format!("[{}, {}]", CAMERA.width, CAMERA.height))
     );
+}
+
+#[test]
+fn memory_that_served_before_leaves_no_trace_in_the_next_frame() {
+    let mut fresh = Cleaner::new(calibration(AZURE), CleanConfig::default());
+    let mut recycling = fresh.clone();
+    // Somebody walks across: pixels of one frame's person are background in the next.
+    for (number, x_m) in [-0.5, 0.4, 0.0].into_iter().enumerate() {
+        let view = render(&[room(), figure(at(x_m, 2.4), 4)], 0.0);
+        let frame = expose(&view, AZURE, number as u64);
+        let expected = fresh.process(&frame).unwrap();
+        let found = recycling.process(&frame).unwrap();
+        let bits = |clean: &CleanFrame| -> Vec<u32> {
+            let points = clean.vertices.points.iter();
+            let vectors = points.chain(&clean.normals.normals);
+            let numbers = vectors.flat_map(Vec3::to_array);
+            let all = numbers.chain(clean.depth.metres.iter().copied());
+            all.chain(clean.sigma_m.iter().copied())
+                .map(f32::to_bits)
+                .collect()
+        };
+        assert!(bits(&expected) == bits(&found), "frame {number}");
+        assert_eq!(expected.person, found.person);
+        recycling.recycle(found);
+    }
 }

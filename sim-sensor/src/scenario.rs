@@ -159,6 +159,16 @@ impl Scenario {
         Timestamp::from_secs_f64(frames / f64::from(self.rate_hz()))
     }
 
+    /// Where a movement is at a frame: it repeats for as long as the scenario lasts.
+    pub(crate) fn looped_secs(&self, frame: FrameId, duration_secs: f32) -> f32 {
+        let secs = self.timestamp(frame).as_secs_f64() as f32;
+        if duration_secs > 0.0 {
+            secs % duration_secs
+        } else {
+            0.0
+        }
+    }
+
     /// In frames, below one.
     fn lateness(&self, frame: FrameId) -> f32 {
         const MOST: f32 = 0.9;

@@ -3,9 +3,11 @@
 use std::sync::{Arc, Mutex, PoisonError};
 
 use effigy_capture::{FrameId, Rigid3};
+use effigy_fusion::TriangleMesh;
 use effigy_registration::{
     BodyModel,
     motion::{Motion, MotionPose},
+    smpl::VertexWeights,
 };
 
 use crate::{
@@ -23,7 +25,7 @@ pub(crate) struct Scene {
     pub(crate) person: Person,
     pub(crate) world_from_camera: Rigid3,
     motion: Motion,
-    /// Simulated clothes, shared by all who look at this scene.
+    /// Simulated clothes, shared by the clones of this scene.
     cloth: Option<Arc<Mutex<Tape>>>,
 }
 
@@ -58,13 +60,9 @@ impl Scene {
 
     /// Movements end as they begin, so they repeat for as long as the scenario lasts.
     pub(crate) fn pose(&self, frame: FrameId) -> MotionPose {
-        let secs = self.scenario.timestamp(frame).as_secs_f64() as f32;
-        let duration_secs = self.motion.duration_secs();
-        let secs = if duration_secs > 0.0 {
-            secs % duration_secs
-        } else {
-            0.0
-        };
+        let secs = self
+            .scenario
+            .looped_secs(frame, self.motion.duration_secs());
         self.motion
             .at(secs)
             .expect("routines and clips have at least one pose")
@@ -72,13 +70,25 @@ impl Scene {
 
     /// The person in simulated clothes in a frame; `None` for clothes that are part of the person's surface.
     pub(crate) fn in_cloth(&self, frame: FrameId) -> Option<ClothedSurface> {
+        self.worn_at(frame, Wear::surface)
+    }
+
+    /// As [`Self::in_cloth`], only what a camera needs: the posed surface and its skinning weights.
+    pub(crate) fn posed_in_cloth(
+        &self,
+        frame: FrameId,
+    ) -> Option<(TriangleMesh, Vec<VertexWeights>)> {
+        self.worn_at(frame, |wear| {
+            let (posed, weights, _) = wear.posed_surface();
+            (posed, weights)
+        })
+    }
+
+    fn worn_at<T>(&self, frame: FrameId, look: impl FnOnce(&Wear) -> T) -> Option<T> {
         let tape = self.cloth.as_ref()?;
         // A panic elsewhere left the tape between frames at worst; it starts from a kept state again.
         let mut tape = tape.lock().unwrap_or_else(PoisonError::into_inner);
-        let wear = tape.at(frame.0, |frame| self.pose(FrameId(frame)));
-        let mut surface = wear.surface();
-        surface.posed.colors = self.person.paint.vertex_colors();
-        Some(surface)
+        Some(look(tape.at(frame.0, |frame| self.pose(FrameId(frame)))))
     }
 
     pub(crate) fn is_in_cloth(&self) -> bool {

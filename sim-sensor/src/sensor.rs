@@ -144,8 +144,8 @@ impl Actor {
 
 fn draw_person<'a>(renderer: &'a mut Renderer, scene: &Scene, frame: FrameId) -> &'a View {
     let person = &scene.person;
-    if let Some(surface) = scene.in_cloth(frame) {
-        return renderer.render(&surface.posed, &person.paint, &surface.weights);
+    if let Some((posed, weights)) = scene.posed_in_cloth(frame) {
+        return renderer.render(&posed, &person.paint, &weights);
     }
     let pose = scene.pose(frame);
     let mesh = person.clothed_posed(&pose.theta, pose.trans);

@@ -11,7 +11,11 @@ use effigy_registration::{
 use glam::Vec3;
 
 use crate::{
-    cloth::ClothedSurface, error::SimError, person::Person, scenario::Scenario, scene::Scene,
+    cloth::{ClothedSurface, rms_between_m},
+    error::SimError,
+    person::Person,
+    scenario::Scenario,
+    scene::Scene,
 };
 
 /// The truth about each frame of a scenario.
@@ -70,21 +74,32 @@ impl Truth {
         self.scene.person.params(&pose.theta, pose.trans)
     }
 
+    /// Only the body under the clothes, in world space, and where the camera stands: cheap.
+    pub fn minimal(&self, frame: FrameId) -> (PosedBody, Rigid3) {
+        let person = &self.scene.person;
+        let pose = self.scene.pose(frame);
+        let minimal = if person.individual.is_some() {
+            person.minimal_posed(&pose.theta, pose.trans)
+        } else {
+            person.body.pose(&person.params(&pose.theta, pose.trans))
+        };
+        (minimal, self.scene.world_from_camera)
+    }
+
     /// Frames in any order; with simulated clothes a frame far ahead costs the frames between.
     pub fn at(&self, frame: FrameId) -> GroundTruth {
         let person = &self.scene.person;
         let pose = self.scene.pose(frame);
         let params = person.params(&pose.theta, pose.trans);
-        let of_params = person.body.pose(&params);
-        let (minimal, params_residual_m) = if person.individual.is_some() {
-            let minimal = person.minimal_posed(&pose.theta, pose.trans);
-            let residual_m = rms_distance_m(&minimal.vertices, &of_params.vertices);
-            (minimal, residual_m)
+        let (minimal, world_from_camera) = self.minimal(frame);
+        let params_residual_m = if person.individual.is_some() {
+            rms_between_m(&minimal.vertices, &person.body.pose(&params).vertices)
         } else {
-            (of_params, 0.0)
+            0.0
         };
         let (clothed_in_world, clothed_canonical, in_cloth) = match self.scene.in_cloth(frame) {
-            Some(surface) => {
+            Some(mut surface) => {
+                surface.posed.colors = person.paint.vertex_colors();
                 let ClothedSurface { posed, canonical, weights, layers } = surface.envelope();
                 let vertices = canonical.vertices.clone();
                 (
@@ -104,7 +119,7 @@ impl Truth {
             timestamp: self.scene.scenario.timestamp(frame),
             params,
             params_residual_m,
-            world_from_camera: self.scene.world_from_camera,
+            world_from_camera,
             minimal,
             clothed_in_world,
             clothed_canonical,
@@ -112,9 +127,4 @@ impl Truth {
             rest_joints: person.rest_joints,
         }
     }
-}
-
-fn rms_distance_m(a: &[Vec3], b: &[Vec3]) -> f32 {
-    let squares: f32 = a.iter().zip(b).map(|(a, b)| a.distance_squared(*b)).sum();
-    (squares / a.len().max(1) as f32).sqrt()
 }

@@ -3,11 +3,11 @@
 use std::collections::BTreeMap;
 
 use effigy_registration::smpl::builtin;
-use effigy_sim_sensor::{SimulatedSensor, Truth};
+use effigy_sim_sensor::SimulatedSensor;
 
 use super::{
     chain::{self, Input, Pace},
-    scene::{SECONDS, scenario},
+    scene::{SECONDS, scenario, truth},
     simulate::SCENARIO_KEY,
 };
 use crate::cli::DemoArgs;
@@ -20,12 +20,9 @@ pub(crate) fn run(args: &DemoArgs) -> anyhow::Result<()> {
         let seconds = if windowed { UNTIL_CLOSED_SECS } else { SECONDS };
         let scenario = scenario(&args.scene, seconds)?;
         let sensor = SimulatedSensor::new(&scenario, builtin::body())?;
-        // Of a character from elsewhere, nobody knows the true body.
-        let has_true_body = scenario.stranger.is_none();
-        let truth = has_true_body.then(|| Truth::new(&scenario, builtin::body()));
         Ok(Input {
             source: Box::new(sensor),
-            truth: truth.transpose()?,
+            truth: truth(&scenario)?,
             pace: Pace::LockStep,
             metadata: BTreeMap::from([(SCENARIO_KEY.to_owned(), scenario.to_json())]),
             decided: None,

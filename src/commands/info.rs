@@ -1,6 +1,6 @@
 //! `effigy info`: what a file holds.
 
-use std::{fs, path::Path};
+use std::path::Path;
 
 use anyhow::{Context as _, bail};
 use effigy_avatar::checkpoint;
@@ -8,15 +8,14 @@ use effigy_capture::{recording, source};
 use effigy_registration::BodyModel;
 use serde_json::{Value, json};
 
-use crate::cli::InfoArgs;
+use crate::{cli::InfoArgs, files};
 
 pub(crate) fn run(args: &InfoArgs) -> anyhow::Result<()> {
     let facts = facts(&args.input)?;
     let text = serde_json::to_string_pretty(&facts).context("facts are plain data")?;
     println!("{text}");
     if let Some(path) = &args.json {
-        fs::write(path, text + "\n")
-            .with_context(|| format!("{}: cannot write; is the folder there?", path.display()))?;
+        files::write(path, text + "\n")?;
     }
     Ok(())
 }

@@ -7,21 +7,16 @@ use effigy_capture::{
     recording::{Player, Recording},
     source,
 };
-use effigy_registration::smpl::builtin;
 use effigy_sim_sensor::{Scenario, Truth};
 
 use super::{
     chain::{self, Input, Pace},
+    scene::truth,
     simulate::SCENARIO_KEY,
 };
 use crate::{cli::ReplayArgs, pipeline::schedule::Schedule};
 
 pub(crate) fn run(args: &ReplayArgs) -> anyhow::Result<()> {
-    let pace = if args.realtime {
-        Pace::RealTime
-    } else {
-        Pace::LockStep
-    };
     if let Some(record) = &args.chain.record {
         ensure!(
             !is_same_file(&args.input, record),
@@ -29,20 +24,21 @@ pub(crate) fn run(args: &ReplayArgs) -> anyhow::Result<()> {
             record.display()
         );
     }
-    let open = |_windowed: bool| {
-        let input = open(args)?;
-        Ok(Input { pace, ..input })
-    };
-    chain::run(open, &args.chain)
+    chain::run(|_windowed| open(args), &args.chain)
 }
 
 /// The source; of a recording, also the truth if a simulator left its scenario there, and what was decided live.
 fn open(args: &ReplayArgs) -> anyhow::Result<Input> {
+    let pace = if args.realtime {
+        Pace::RealTime
+    } else {
+        Pace::LockStep
+    };
     if !source::is_recording(&args.input) {
         return Ok(Input {
             source: source::open(&args.input)?,
             truth: None,
-            pace: Pace::LockStep,
+            pace,
             metadata: BTreeMap::new(),
             decided: None,
         });
@@ -54,23 +50,12 @@ fn open(args: &ReplayArgs) -> anyhow::Result<Input> {
     let metadata = metadata.into_iter().collect();
     let decided =
         Schedule::recorded(recording.events()).with_context(|| args.input.display().to_string())?;
-    Ok(Input {
-        source: Box::new(Player::new(recording)),
-        truth,
-        pace: Pace::LockStep,
-        metadata,
-        decided,
-    })
+    Ok(Input { source: Box::new(Player::new(recording)), truth, pace, metadata, decided })
 }
 
 /// What the simulator left there, if it can be made again here.
 fn truth_of(scenario: &str) -> Option<Truth> {
-    let truth = Scenario::from_json(scenario).and_then(|scenario| {
-        // Of a character from elsewhere, nobody knows the true body.
-        let has_true_body = scenario.stranger.is_none();
-        let truth = has_true_body.then(|| Truth::new(&scenario, builtin::body()));
-        truth.transpose()
-    });
+    let truth = Scenario::from_json(scenario).and_then(|scenario| truth(&scenario));
     truth
         .inspect_err(|error| eprintln!("effigy: nothing is compared with the truth: {error}"))
         .ok()

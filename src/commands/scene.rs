@@ -1,6 +1,7 @@
 //! From what was typed about a simulated scene to the scene.
 
-use effigy_sim_sensor::{Scenario, stranger::StrangerChoice};
+use effigy_registration::smpl::builtin;
+use effigy_sim_sensor::{Scenario, SimError, StrangerChoice, Truth};
 
 use crate::cli::SceneArgs;
 
@@ -23,4 +24,11 @@ pub(crate) fn scenario(args: &SceneArgs, seconds: f32) -> anyhow::Result<Scenari
         ..Scenario::default()
     };
     Ok(scenario.checked()?)
+}
+
+/// The truth of a scenario; of a character from elsewhere nobody knows the true body.
+pub(crate) fn truth(scenario: &Scenario) -> Result<Option<Truth>, SimError> {
+    let has_true_body = scenario.stranger.is_none();
+    let truth = has_true_body.then(|| Truth::new(scenario, builtin::body()));
+    truth.transpose()
 }

@@ -2,7 +2,7 @@
 
 use std::{fs, ops::ControlFlow, path::PathBuf, sync::Arc};
 
-use anyhow::{Context as _, bail};
+use anyhow::bail;
 use effigy_avatar::{
     Subject,
     hyper::{Precision, Provenance},
@@ -14,7 +14,7 @@ use effigy_sim_sensor::population;
 
 use crate::{
     cli::{TrainArgs, TrainPriorArgs, TrainWhat},
-    interrupt,
+    files, interrupt,
     progress::Progress,
 };
 
@@ -64,8 +64,7 @@ fn prior(args: &TrainPriorArgs) -> anyhow::Result<()> {
         is_placeholder: false,
     };
     let bytes = network.to_bytes(Precision::F16)?;
-    fs::write(&args.out, &bytes)
-        .with_context(|| format!("{}: cannot write; is the folder there?", args.out.display()))?;
+    files::write(&args.out, &bytes)?;
     fs::remove_file(&checkpoint).ok();
     println!("{}: {} bytes", args.out.display(), bytes.len());
     Ok(())

@@ -11,7 +11,7 @@ use std::{
 };
 
 use anyhow::{Context as _, anyhow, ensure};
-use crossbeam::channel::{Receiver, RecvTimeoutError, bounded};
+use crossbeam::channel::{Receiver, Select, TryRecvError, bounded};
 use effigy_avatar::{
     Avatar, CanonicalSamples, Canonicaliser, TopologyConfig,
     fine_tune::{FineTuneProgress, fine_tune},
@@ -99,15 +99,22 @@ impl AvatarJob {
         !self.result.is_empty() || self.thread.is_finished()
     }
 
+    /// Returns when the avatar is there or the user wants to stop; `meanwhile` is called now and then.
+    pub(crate) fn wait_until_finished(&self, mut meanwhile: impl FnMut()) {
+        let mut ready = Select::new();
+        ready.recv(&self.result);
+        while !interrupt::requested() && ready.ready_timeout(LOOK_EVERY).is_err() {
+            meanwhile();
+        }
+    }
+
     /// The avatar, waited for if need be; `None` if the user wants to stop.
     pub(crate) fn wait(&self) -> Option<anyhow::Result<FinishedAvatar>> {
-        loop {
-            match self.result.recv_timeout(LOOK_EVERY) {
-                Ok(finished) => return Some(finished),
-                Err(RecvTimeoutError::Disconnected) => return Some(Err(died())),
-                Err(RecvTimeoutError::Timeout) if interrupt::requested() => return None,
-                Err(RecvTimeoutError::Timeout) => {}
-            }
+        self.wait_until_finished(|| {});
+        match self.result.try_recv() {
+            Ok(finished) => Some(finished),
+            Err(TryRecvError::Disconnected) => Some(Err(died())),
+            Err(TryRecvError::Empty) => None,
         }
     }
 

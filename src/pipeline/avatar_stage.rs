@@ -1,6 +1,6 @@
 //! From tracked bodies to a driven avatar: collects keyframes, has the avatar made and made better, drives it.
 
-use std::{collections::BTreeSet, sync::Arc, thread, time::Duration};
+use std::{collections::BTreeSet, sync::Arc};
 
 use effigy_avatar::{
     Avatar, AvatarMesh, DriveConfig, Driver, KeyframeSelector, fine_tune::FineTuneProgress,
@@ -14,10 +14,6 @@ use super::{
     schedule::{Decision, Schedule},
     settings::Settings,
 };
-use crate::interrupt;
-
-/// How often somebody who waits for an avatar looks up.
-const LOOK_EVERY: Duration = Duration::from_millis(200);
 
 pub(crate) struct AvatarStage {
     body: Arc<BodyModel>,
@@ -128,19 +124,10 @@ impl AvatarStage {
     /// Waits for an avatar that is being made, at the end of a source; not if the user wants to stop. `meanwhile`
     /// is called now and then.
     pub(crate) fn end(&mut self, mut meanwhile: impl FnMut(&Self)) -> anyhow::Result<()> {
-        while let Some(making) = &self.making
-            && !making.job.is_finished()
-            && !interrupt::requested()
-        {
-            meanwhile(self);
-            thread::sleep(LOOK_EVERY);
+        if let Some(making) = &self.making {
+            making.job.wait_until_finished(|| meanwhile(self));
         }
-        let decision = if interrupt::requested() {
-            Decision::Cancel
-        } else {
-            Decision::TakeOver
-        };
-        self.perform(decision)
+        self.take_over()
     }
 
     /// What the avatar that is driven learned from, or what the first one will.

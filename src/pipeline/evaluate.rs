@@ -26,7 +26,7 @@ const OBSERVED_FRAMES: usize = 60;
 const TRUTH_FRAMES: usize = 10;
 
 /// MetaAvatar's grid: its `D_p` means nothing at another density.
-const RESOLUTION: usize = 256;
+pub(crate) const RESOLUTION: usize = 256;
 
 /// Fills in the report's scores.
 pub(crate) fn evaluate(
@@ -47,18 +47,19 @@ pub(crate) fn evaluate(
             observed_mm: mean_observed(&observed, |sample| true_surface_in_world(truth, sample))?,
             ..SurfaceScores::default()
         });
-        let compared = evenly(&unseen, TRUTH_FRAMES);
-        let judge = Judge { body, truth };
+        let frames = evenly(&unseen, TRUTH_FRAMES).into_iter();
+        let frames = frames.map(|sample| Compared::new(sample, truth, body));
+        let judge = Judge { body, frames: frames.collect() };
         bare = judge
-            .scores(&compared, Poses::True, &bare_mesh)?
+            .scores(Poses::True, &bare_mesh)?
             .with_observed(bare.observed_mm);
-        let tracked = judge.scores(&compared, Poses::Tracked, &bare_mesh)?;
+        let tracked = judge.scores(Poses::Tracked, &bare_mesh)?;
         report.bare_body_tracked = Some(tracked.with_observed(bare.observed_mm));
         if let Some(avatar) = avatar {
             let surface = FullSurface::new(avatar, body);
             let avatar_mesh = |params: &BodyParams| surface.posed(params);
-            report.avatar = Some(judge.scores(&compared, Poses::True, &avatar_mesh)?);
-            report.avatar_tracked = Some(judge.scores(&compared, Poses::Tracked, &avatar_mesh)?);
+            report.avatar = Some(judge.scores(Poses::True, &avatar_mesh)?);
+            report.avatar_tracked = Some(judge.scores(Poses::Tracked, &avatar_mesh)?);
         }
     }
     if let Some(avatar) = avatar {
@@ -88,51 +89,96 @@ enum Poses {
     Tracked,
 }
 
-/// Compares surfaces with the true one, in the depth camera's space.
+/// Sums of MetaAvatar's measures and the symmetric one over frames.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct ScoreSum {
+    sums: [f64; 4],
+    pub(crate) frames: usize,
+}
+
+/// Means over frames.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct MeanScores {
+    pub(crate) d_p_cm: f64,
+    pub(crate) d_f_cm: f64,
+    pub(crate) nc: f64,
+    pub(crate) p2s_mm: f64,
+}
+
+impl ScoreSum {
+    /// Adds a frame, unless nothing of it can be measured; both surfaces in one space.
+    pub(crate) fn add(
+        &mut self,
+        truth: &TriangleMesh,
+        measured: &[bool],
+        predicted: &TriangleMesh,
+    ) -> anyhow::Result<()> {
+        let Some(scores) = metrics::surface_metrics(truth, measured, predicted)? else {
+            return Ok(());
+        };
+        let p2s_mm = metrics::p2s_mm(truth, predicted)?;
+        let values = [scores.d_p_cm, scores.d_f_cm, scores.nc, p2s_mm];
+        for (sum, value) in self.sums.iter_mut().zip(values) {
+            *sum += f64::from(value);
+        }
+        self.frames += 1;
+        Ok(())
+    }
+
+    /// `None` of no frame.
+    pub(crate) fn mean(&self) -> Option<MeanScores> {
+        let [d_p_cm, d_f_cm, nc, p2s_mm] = self.sums.map(|sum| sum / self.frames as f64);
+        (self.frames > 0).then_some(MeanScores { d_p_cm, d_f_cm, nc, p2s_mm })
+    }
+}
+
+/// A frame and its truth, in the depth camera's space.
+struct Compared<'a> {
+    sample: &'a TrackedSample,
+    truth: GroundTruth,
+    surface: TriangleMesh,
+    measured: Vec<bool>,
+}
+
+impl<'a> Compared<'a> {
+    fn new(sample: &'a TrackedSample, truth: &Truth, body: &BodyModel) -> Self {
+        let truth = truth.at(sample.id);
+        let camera_from_sim = truth.world_from_camera.inverse();
+        let surface = moved(&truth.clothed_in_world, camera_from_sim);
+        let weights = match &truth.in_cloth {
+            Some(cloth) => &cloth.weights,
+            None => &body.skinning,
+        };
+        let measured = metrics::measured_vertices(weights, &surface.triangles);
+        Self { sample, truth, surface, measured }
+    }
+}
+
+/// Compares surfaces with the true one.
 struct Judge<'a> {
     body: &'a BodyModel,
-    truth: &'a Truth,
+    frames: Vec<Compared<'a>>,
 }
 
 impl Judge<'_> {
     fn scores(
         &self,
-        samples: &[&TrackedSample],
         poses: Poses,
         surface_in_own_space: &dyn Fn(&BodyParams) -> TriangleMesh,
     ) -> anyhow::Result<SurfaceScores> {
-        let mut sums = [0.0_f64; 4];
-        let mut count = 0;
-        for sample in samples {
-            let true_frame = self.truth.at(sample.id);
-            let camera_from_sim = true_frame.world_from_camera.inverse();
-            let params = self.params_in_camera(sample, &true_frame, poses);
-            let truth = moved(&true_frame.clothed_in_world, camera_from_sim);
+        let mut sum = ScoreSum::default();
+        for frame in &self.frames {
+            let params = self.params_in_camera(frame.sample, &frame.truth, poses);
             let predicted = surface_in_own_space(&params);
-            let weights = match &true_frame.in_cloth {
-                Some(cloth) => &cloth.weights,
-                None => &self.body.skinning,
-            };
-            let measured = metrics::measured_vertices(weights, &truth.triangles);
-            let Some(scores) = metrics::surface_metrics(&truth, &measured, &predicted)? else {
-                continue;
-            };
-            let p2s_mm = metrics::p2s_mm(&truth, &predicted)?;
-            for (sum, value) in
-                sums.iter_mut()
-                    .zip([scores.d_p_cm, scores.d_f_cm, scores.nc, p2s_mm])
-            {
-                *sum += f64::from(value);
-            }
-            count += 1;
+            sum.add(&frame.surface, &frame.measured, &predicted)?;
         }
-        let mean = |sum: f64| (count > 0).then(|| sum / f64::from(count));
+        let mean = sum.mean();
         Ok(SurfaceScores {
             observed_mm: None,
-            d_p_cm: mean(sums[0]),
-            d_f_cm: mean(sums[1]),
-            nc: mean(sums[2]),
-            p2s_mm: mean(sums[3]),
+            d_p_cm: mean.map(|mean| mean.d_p_cm),
+            d_f_cm: mean.map(|mean| mean.d_f_cm),
+            nc: mean.map(|mean| mean.nc),
+            p2s_mm: mean.map(|mean| mean.p2s_mm),
         })
     }
 
@@ -184,14 +230,13 @@ impl<'a> FullSurface<'a> {
 fn body_scores(log: &RunLog, body: &BodyModel, truth: &Truth) -> Option<BodyScores> {
     let mut sums = [0.0_f64; 2];
     for sample in &log.tracked {
-        let true_frame = truth.at(sample.id);
+        let (minimal, world_from_camera) = truth.minimal(sample.id);
         let tracked = body.pose(&sample.params);
         let to_camera = |b_from_a: Rigid3, points: &[Vec3]| -> Vec<Vec3> {
             points.iter().map(|&point| b_from_a * point).collect()
         };
         let from_tracked = sample.world_from_camera.inverse();
-        let from_true = true_frame.world_from_camera.inverse();
-        let minimal = &true_frame.minimal;
+        let from_true = world_from_camera.inverse();
         sums[0] += f64::from(metrics::v2v_mm(
             &to_camera(from_true, &minimal.joints),
             &to_camera(from_tracked, &tracked.joints),
@@ -247,8 +292,14 @@ fn mesh(vertices: Vec<Vec3>, triangles: &[[u32; 3]]) -> TriangleMesh {
 
 /// At most `count` items, evenly spread.
 fn evenly<T: Copy>(items: &[T], count: usize) -> Vec<T> {
-    let taken = count.min(items.len());
+    let places = evenly_placed(items.len(), count).into_iter();
+    places.map(|place| items[place]).collect()
+}
+
+/// At most `count` of the places below `length`, evenly spread, in order.
+pub(crate) fn evenly_placed(length: usize, count: usize) -> Vec<usize> {
+    let taken = count.min(length);
     (0..taken)
-        .map(|index| items[(2 * index + 1) * items.len() / (2 * taken)])
+        .map(|index| (2 * index + 1) * length / (2 * taken))
         .collect()
 }

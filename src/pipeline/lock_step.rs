@@ -2,11 +2,15 @@
 
 use std::sync::Arc;
 
-use effigy_capture::{FrameId, FrameSource};
+use effigy_capture::FrameSource;
 use effigy_registration::BodyModel;
 
 use super::{
-    avatar_stage::AvatarStage, clock::Clock, outputs::Outputs, run_log::RunLog, settings::Settings,
+    avatar_stage::AvatarStage,
+    clock::Clock,
+    outputs::Outputs,
+    run_log::{Captured, RunLog},
+    settings::Settings,
     track_stage::TrackStage,
 };
 use crate::interrupt;
@@ -21,16 +25,13 @@ pub(crate) fn run(
 ) -> anyhow::Result<RunLog> {
     let mut tracking = TrackStage::new(source.calibration(), Arc::clone(body), settings, clock);
     let mut log = RunLog::new(clock);
-    let (mut delivered, mut missing) = (0, 0);
-    let mut before: Option<FrameId> = None;
+    let mut captured = Captured::default();
     while !interrupt::requested() {
         let Some(frame) = log.timings.time(&clock, "source", || source.next_frame())? else {
             break;
         };
         log.delivered(&frame);
-        delivered += 1;
-        missing += before.map_or(0, |before| frame.id.0.saturating_sub(before.0 + 1));
-        before = Some(frame.id);
+        captured.count(&frame, false);
         let tracked = tracking.process(&frame)?;
         let registered = &tracked.registered;
         log.registered(&tracked);
@@ -39,7 +40,7 @@ pub(crate) fn run(
         outputs.record(&frame, &decided)?;
         outputs.frame(&frame, registered, mesh.as_ref(), (avatar, &log))?;
     }
-    log.captured(delivered, 0, missing);
+    log.captured(&captured);
     outputs.wait_for_avatar(avatar)?;
     log.avatar_made(avatar);
     Ok(log)

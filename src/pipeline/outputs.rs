@@ -1,10 +1,6 @@
 //! What a run writes while it runs and when it ends.
 
-use std::{
-    fs::{self, OpenOptions},
-    path::{Path, PathBuf},
-    sync::Arc,
-};
+use std::{fs, path::PathBuf, sync::Arc};
 
 use anyhow::Context as _;
 use effigy_avatar::{
@@ -28,7 +24,7 @@ use super::{
     run_log::{RunLog, TrackedSample},
     schedule::Decision,
 };
-use crate::{cli::ChainArgs, progress::Progress};
+use crate::{cli::ChainArgs, files, progress::Progress};
 
 /// How many moments a contact sheet shows.
 const MOMENTS: u64 = 8;
@@ -73,7 +69,7 @@ impl Outputs {
             })?;
         }
         for file in args.poses.iter().chain(&args.json) {
-            check_writable(file)?;
+            files::check_writable(file)?;
         }
         Ok(Self {
             out: args.out.clone(),
@@ -263,17 +259,6 @@ fn evenly_timed(tracked: &[TrackedSample], rate_hz: f32) -> Vec<MotionPose> {
         }
     }
     poses
-}
-
-/// Fails now rather than after the work; an existing file stays as it is.
-fn check_writable(path: &Path) -> anyhow::Result<()> {
-    let opened = OpenOptions::new().append(true).create(true).open(path);
-    opened.map(drop).with_context(|| {
-        format!(
-            "{}: cannot write there; is the folder there and writable?",
-            path.display()
-        )
-    })
 }
 
 #[cfg(test)]

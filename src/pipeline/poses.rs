@@ -1,6 +1,6 @@
 //! `--poses`: each frame's body in the depth camera's space, for others to score.
 
-use std::{collections::BTreeMap, fs, path::Path};
+use std::{collections::BTreeMap, path::Path};
 
 use anyhow::Context as _;
 use effigy_capture::Rigid3;
@@ -10,6 +10,8 @@ use effigy_registration::{
 };
 use glam::{Mat3, Quat, Vec3};
 use serde::Serialize;
+
+use crate::files;
 
 /// The whole file.
 #[derive(Debug, Serialize)]
@@ -72,12 +74,7 @@ impl PoseLog {
             frames: &self.frames,
         };
         let text = serde_json::to_string(&file).context("poses are plain numbers")?;
-        fs::write(path, text + "\n").with_context(|| {
-            format!(
-                "{}: cannot write the poses; is the folder there and writable?",
-                path.display()
-            )
-        })
+        files::write(path, text + "\n")
     }
 }
 

@@ -14,7 +14,7 @@ use std::{
 use anyhow::Context as _;
 use crossbeam::channel::{Receiver, RecvTimeoutError, Sender, TrySendError, bounded};
 use effigy_capture::{
-    Frame, FrameId, FrameSource, Timestamp,
+    Frame, FrameSource, Timestamp,
     replay::{Due, Pacer},
 };
 use effigy_registration::BodyModel;
@@ -25,7 +25,7 @@ use super::{
     clock::Clock,
     controls::Controls,
     outputs::Outputs,
-    run_log::RunLog,
+    run_log::{Captured, RunLog},
     settings::Settings,
     track_stage::{TrackStage, TrackedFrame},
 };
@@ -91,7 +91,7 @@ pub(crate) fn run(
         joined(track)?;
         let captured = joined(capture)?;
         driven?;
-        log.captured(captured.delivered, captured.dropped, captured.missing);
+        log.captured(&captured);
         anyhow::Ok(())
     })?;
     outputs.wait_for_avatar(avatar)?;
@@ -113,13 +113,6 @@ fn joined<T>(thread: ScopedJoinHandle<'_, anyhow::Result<T>>) -> anyhow::Result<
     thread.join().unwrap_or_else(|panic| resume_unwind(panic))
 }
 
-#[derive(Clone, Copy, Debug, Default)]
-struct Captured {
-    delivered: u64,
-    dropped: u64,
-    missing: u64,
-}
-
 /// Delivers frames when their time has come; a frame that nobody took makes way for the next.
 fn capture(
     source: &mut dyn FrameSource,
@@ -129,7 +122,7 @@ fn capture(
 ) -> anyhow::Result<Captured> {
     let mut captured = Captured::default();
     let mut pacer = Pacer::new(1.0);
-    let mut before: Option<(FrameId, Timestamp)> = None;
+    let mut before: Option<Timestamp> = None;
     let stopped = || interrupt::requested() || stop.load(Ordering::Relaxed);
     while !stopped() {
         let steered = controls.steer(source, stopped);
@@ -142,21 +135,16 @@ fn capture(
         let Some(frame) = source.next_frame()? else {
             break;
         };
-        let looped = before.is_some_and(|(_, before)| frame.timestamp < before);
+        let looped = before.is_some_and(|before| frame.timestamp < before);
         let jumped = steered.jumped || looped;
-        if let Some((before, _)) = before
-            && !jumped
-        {
-            captured.missing += frame.id.0.saturating_sub(before.0 + 1);
-        }
-        before = Some((frame.id, frame.timestamp));
+        before = Some(frame.timestamp);
+        captured.count(&frame, jumped);
         let at = wait_until_due(&mut pacer, frame.timestamp, clock);
-        captured.delivered += 1;
         let mut item = Delivered {
             frame,
             at,
             jumped,
-            dropped_so_far: captured.dropped,
+            dropped_so_far: captured.too_late,
             playback: controls.playback(source.player()),
         };
         loop {
@@ -165,7 +153,7 @@ fn capture(
                 Err(TrySendError::Full(back)) => {
                     item = back;
                     if let Ok(stale) = waiting.try_recv() {
-                        captured.dropped += 1;
+                        captured.too_late += 1;
                         item.jumped |= stale.jumped;
                     }
                 }

@@ -26,6 +26,30 @@ pub(crate) const TOO_LATE: &str = "tracking was busy";
 /// Why a frame never came: its number is missing.
 const MISSING: &str = "missing in the source";
 
+/// What capture counts.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Captured {
+    pub(crate) delivered: u64,
+    /// Frames that made way for newer ones.
+    pub(crate) too_late: u64,
+    /// Frames that the source never had.
+    missing: u64,
+    before: Option<FrameId>,
+}
+
+impl Captured {
+    /// A frame came; after a jump, the numbers between say nothing.
+    pub(crate) fn count(&mut self, frame: &Frame, jumped: bool) {
+        self.delivered += 1;
+        if let Some(before) = self.before
+            && !jumped
+        {
+            self.missing += frame.id.0.saturating_sub(before.0 + 1);
+        }
+        self.before = Some(frame.id);
+    }
+}
+
 /// A tracked frame, reduced to what evaluation needs.
 #[derive(Clone, Debug)]
 pub(crate) struct TrackedSample {
@@ -123,11 +147,11 @@ impl RunLog {
         self.frames_since_first_track += u64::from(self.first_track.is_some());
     }
 
-    /// What capture counted: frames that came, that made way for newer ones, and that the source never had.
-    pub(crate) fn captured(&mut self, delivered: u64, too_late: u64, missing: u64) {
-        self.delivered = delivered;
-        self.dropped_so_far = too_late;
-        for (cause, count) in [(TOO_LATE, too_late), (MISSING, missing)] {
+    /// Takes over what capture counted.
+    pub(crate) fn captured(&mut self, captured: &Captured) {
+        self.delivered = captured.delivered;
+        self.dropped_so_far = captured.too_late;
+        for (cause, count) in [(TOO_LATE, captured.too_late), (MISSING, captured.missing)] {
             if count > 0 {
                 self.dropped.insert(cause.to_owned(), count);
             }

@@ -28,15 +28,7 @@ impl Contacts {
     /// `posed` are the body's posed vertices. Points count as undecided if they are within `reach_m` of both a
     /// forearm and the rest of the body, and nearer to one than to the other by less than `margin_m`.
     pub(super) fn new(model: &BodyModel, posed: &[Vec3], reach_m: f32, margin_m: f32) -> Self {
-        let main_bone: Vec<u8> = model
-            .skinning
-            .iter()
-            .map(|weights| {
-                let largest =
-                    (0..4).max_by(|&a, &b| weights.weights[a].total_cmp(&weights.weights[b]));
-                weights.bones[largest.unwrap_or(0)]
-            })
-            .collect();
+        let main_bone = model.part_labels();
         let of_bones = |belongs: &dyn Fn(u8) -> bool| {
             let triangles = model
                 .triangles

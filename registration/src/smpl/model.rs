@@ -46,6 +46,20 @@ pub struct VertexWeights {
     pub weights: [f32; 4],
 }
 
+impl VertexWeights {
+    /// The bone with the largest weight; of equal ones the first.
+    pub fn main_bone(&self) -> u8 {
+        let largest = (1..4).fold(0, |best, slot| {
+            if self.weights[slot] > self.weights[best] {
+                slot
+            } else {
+                best
+            }
+        });
+        self.bones[largest]
+    }
+}
+
 /// The hash of everything in a body model; trained files carry it so that bodies are never mixed up.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct BodyIdentity(pub [u8; 16]);

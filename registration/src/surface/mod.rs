@@ -107,14 +107,7 @@ impl Surface {
 
     /// The bone that carries most of a vertex.
     pub(crate) fn main_bone(&self, vertex: usize) -> usize {
-        let weights = &self.skinning[vertex];
-        let mut best = 0;
-        for slot in 1..4 {
-            if weights.weights[slot] > weights.weights[best] {
-                best = slot;
-            }
-        }
-        weights.bones[best] as usize
+        usize::from(self.skinning[vertex].main_bone())
     }
 }
 

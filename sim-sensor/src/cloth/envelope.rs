@@ -37,8 +37,8 @@ pub struct ClothedSurface {
 }
 
 impl Wear {
-    /// Everything that is worn, hidden parts included.
-    pub fn surface(&self) -> ClothedSurface {
+    /// Posed surface, skinning weights and layers of everything that is worn, hidden parts included.
+    pub(crate) fn posed_surface(&self) -> (TriangleMesh, Vec<VertexWeights>, Vec<u8>) {
         let body = &self.person().body;
         let mut vertices = self.body_points().to_vec();
         let mut triangles = body.triangles.clone();
@@ -55,6 +55,12 @@ impl Wear {
         posed.compute_normals();
         tuck(&mut posed, &layers, self.layers());
         posed.compute_normals();
+        (posed, weights, layers)
+    }
+
+    /// Everything that is worn, hidden parts included.
+    pub fn surface(&self) -> ClothedSurface {
+        let (posed, weights, layers) = self.posed_surface();
         let mut canonical = TriangleMesh::new(
             self.in_star_pose(&posed.vertices, &weights),
             posed.triangles.clone(),

@@ -12,7 +12,7 @@ use super::{
     sheet::{NONE, Sheet},
     weights,
 };
-use crate::person::chart::Place;
+use crate::person::{chart::Place, smoothstep};
 
 /// Points a garment gets, and edges between which that may be reached.
 const POINTS: f32 = 3000.0;
@@ -423,10 +423,4 @@ fn held(form: &Form, pattern: &Pattern, sheet: &Sheet) -> Vec<Held> {
         Some(Held { point: v as u32, at_rest, weights, compliance })
     };
     sheet.points.iter().enumerate().filter_map(held).collect()
-}
-
-/// 0 at `from`, 1 at `to` (which may be the smaller one), smooth between.
-fn smoothstep(from: f32, to: f32, x: f32) -> f32 {
-    let t = ((x - from) / (to - from)).clamp(0.0, 1.0);
-    t * t * (3.0 - 2.0 * t)
 }

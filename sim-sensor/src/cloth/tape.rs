@@ -31,10 +31,6 @@ impl Tape {
         }
     }
 
-    pub fn wear(&self) -> &Wear {
-        &self.wear
-    }
-
     /// The clothes in a frame. The first call puts them on and lets them settle in frame 0; going forwards
     /// costs one step a frame, going back a few from the last kept state. The same frame is the same to the
     /// last bit, however it was reached.

@@ -16,7 +16,10 @@ use super::{
     sheet::Sheet,
     solver::{Cloth, Obstacle},
 };
-use crate::{person::Person, random::Randomness};
+use crate::{
+    person::{Person, smoothstep},
+    random::Randomness,
+};
 
 /// How cloth is simulated.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -194,8 +197,10 @@ impl Wear {
             .max(1.0);
         for frame in 1..=frames as usize {
             let share = frame as f32 / frames;
-            let eased = share * share * (3.0 - 2.0 * share);
-            self.step(&cut.interpolate(first, eased), WARM_UP_RATE_HZ.recip());
+            self.step(
+                &cut.interpolate(first, smoothstep(0.0, 1.0, share)),
+                WARM_UP_RATE_HZ.recip(),
+            );
         }
         for _ in 0..(self.config.settle_secs * WARM_UP_RATE_HZ).round() as usize {
             self.step(first, WARM_UP_RATE_HZ.recip());

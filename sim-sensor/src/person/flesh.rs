@@ -11,6 +11,7 @@ use super::{
     bends,
     chart::Chart,
     individual::between,
+    tailor::smoothstep,
 };
 use crate::random::Randomness;
 
@@ -102,7 +103,9 @@ impl Flesh {
 impl Work {
     fn in_pose(self, rotations: &[Mat3; JOINT_COUNT], theta: &[Vec3; JOINT_COUNT]) -> f32 {
         match self {
-            Self::Flexion { joint, full_rad } => smooth(theta[joint].length() / full_rad),
+            Self::Flexion { joint, full_rad } => {
+                smoothstep(0.0, 1.0, theta[joint].length() / full_rad)
+            }
             Self::Raised { side } => {
                 let along = if side == 0 { Vec3::X } else { Vec3::NEG_X };
                 let arm = rotations[13 + side] * rotations[16 + side] * along;
@@ -110,11 +113,6 @@ impl Work {
             }
         }
     }
-}
-
-fn smooth(x: f32) -> f32 {
-    let x = x.clamp(0.0, 1.0);
-    x * x * (3.0 - 2.0 * x)
 }
 
 /// Biceps, calf, thigh, seat and shoulder of one side.

@@ -3,6 +3,7 @@
 use effigy_registration::smpl::builtin;
 
 use super::{anthropometry::mass_of, *};
+use crate::cloth::rms_between_m;
 
 fn individual(seed: u64) -> Person {
     Person::individual(builtin::body(), Outfit::BARE, seed)
@@ -69,15 +70,7 @@ fn no_betas_make_an_individual_but_the_best_ones_come_near() {
         let person = individual(seed);
         let zero = [Vec3::ZERO; JOINT_COUNT];
         let truth = person.minimal_zero_pose(&zero);
-        let rms_to = |betas: &[f32; 10]| {
-            let of_betas = person.body.shaped_vertices(betas);
-            let squares: f32 = truth
-                .iter()
-                .zip(&of_betas)
-                .map(|(a, b)| a.distance_squared(*b))
-                .sum();
-            (squares / truth.len() as f32).sqrt()
-        };
+        let rms_to = |betas: &[f32; 10]| rms_between_m(&truth, &person.body.shaped_vertices(betas));
         let best_m = rms_to(&person.betas);
         // Faces, hands and feet, a third of the vertices, have hardly any offset of their own.
         assert!((0.0010..0.0060).contains(&best_m), "{seed}: {best_m} m off");

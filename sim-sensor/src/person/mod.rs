@@ -33,6 +33,7 @@ pub use paint::{Material, Paint};
 
 use chart::Chart;
 use tailor::Tailoring;
+pub(crate) use tailor::smoothstep;
 
 /// One person in one outfit.
 #[derive(Clone, Debug)]
@@ -82,7 +83,11 @@ impl Person {
         seed: u64,
     ) -> Self {
         let rest_joints = body.joints(&minimal);
-        let pelvis_of_betas = body.joints(&body.shaped_vertices(&betas))[0];
+        // Betas alone make a person of the model.
+        let pelvis_of_betas = match &individual {
+            Some(_) => body.joints(&body.shaped_vertices(&betas))[0],
+            None => rest_joints[0],
+        };
         let chart = Chart::new(&body, minimal.clone(), &rest_joints);
         let tailoring = Tailoring::new(&chart, &outfit, seed);
         let paint = Paint::new(&tailoring, seed);

@@ -289,7 +289,7 @@ fn hair_cover(chart: &Chart, v: usize) -> f32 {
 }
 
 /// 0 at `from`, 1 at `to` (which may be the smaller one), smooth between.
-pub(super) fn smoothstep(from: f32, to: f32, x: f32) -> f32 {
+pub(crate) fn smoothstep(from: f32, to: f32, x: f32) -> f32 {
     let t = ((x - from) / (to - from)).clamp(0.0, 1.0);
     t * t * (3.0 - 2.0 * t)
 }

@@ -179,13 +179,7 @@ impl StrangerScene {
 
     /// Movements repeat for as long as the scenario lasts.
     fn secs(&self, frame: FrameId) -> f32 {
-        let secs = self.scenario.timestamp(frame).as_secs_f64() as f32;
-        let duration_secs = self.motion_secs();
-        if duration_secs > 0.0 {
-            secs % duration_secs
-        } else {
-            0.0
-        }
+        self.scenario.looped_secs(frame, self.motion_secs())
     }
 }
 

@@ -3,16 +3,14 @@
 mod avatar;
 pub(crate) mod tracking;
 
-use std::fs;
-
-use anyhow::{Context as _, bail};
+use anyhow::bail;
 use effigy_registration::smpl::builtin;
 use serde::Serialize;
 
 use self::tracking::{Suite, Table};
 use crate::{
     cli::{EvaluateArgs, EvaluateTrackingArgs, EvaluateWhat, Protocol},
-    interrupt,
+    files, interrupt,
     machine::Machine,
     pipeline::settings::Settings,
     progress::Progress,
@@ -41,6 +39,7 @@ struct Report<'a> {
 }
 
 fn evaluate_tracking(args: &EvaluateTrackingArgs) -> anyhow::Result<()> {
+    files::check_writable(&args.json)?;
     let settings = Settings::load(args.config.as_deref())?;
     let cases = suite(args).cases();
     let progress = Progress::new("tracking", Some(cases.len() as u64));
@@ -57,13 +56,7 @@ fn evaluate_tracking(args: &EvaluateTrackingArgs) -> anyhow::Result<()> {
     print!("{table}");
     let report =
         Report { schema: SCHEMA, machine: Machine::this(), quick: args.quick, table: &table };
-    let text = serde_json::to_string_pretty(&report).context("figures are plain data")?;
-    fs::write(&args.json, text + "\n").with_context(|| {
-        format!(
-            "{}: cannot write; is the folder there?",
-            args.json.display()
-        )
-    })
+    files::write_json(&args.json, &report)
 }
 
 /// The fixed suite, or what the arguments change of it.

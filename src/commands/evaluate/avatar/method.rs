@@ -15,11 +15,8 @@ use effigy_registration::{BodyModel, BodyParams};
 use super::subject::Subject;
 use crate::{
     interrupt,
-    pipeline::{clock::Clock, settings::Settings},
+    pipeline::{clock::Clock, evaluate::RESOLUTION, settings::Settings},
 };
-
-/// MetaAvatar's grid: its `D_p` means nothing at another density.
-const RESOLUTION: usize = 256;
 
 /// Points of a true surface that the oracle learns from.
 const ORACLE_POINTS: usize = 5000;

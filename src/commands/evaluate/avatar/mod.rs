@@ -3,10 +3,8 @@
 mod method;
 mod subject;
 
-use std::{fmt::Write as _, fs, path::Path};
+use std::{fmt::Write as _, path::Path};
 
-use anyhow::Context as _;
-use effigy_avatar::metrics;
 use effigy_registration::smpl::builtin;
 use effigy_sim_sensor::dataset::Dataset;
 use serde::Serialize;
@@ -17,9 +15,9 @@ use self::{
 };
 use crate::{
     cli::EvaluateAvatarArgs,
-    interrupt,
+    files, interrupt,
     machine::Machine,
-    pipeline::{clock::Clock, settings::Settings},
+    pipeline::{clock::Clock, evaluate::ScoreSum, settings::Settings},
     progress::Progress,
 };
 
@@ -58,6 +56,9 @@ struct Row {
 }
 
 pub(super) fn run(args: &EvaluateAvatarArgs, data: &Path) -> anyhow::Result<()> {
+    for file in args.json.iter().chain(&args.md) {
+        files::check_writable(file)?;
+    }
     let clock = Clock::start();
     let body = builtin::body();
     let settings = Settings::load(args.config.as_deref())?;
@@ -96,13 +97,11 @@ pub(super) fn run(args: &EvaluateAvatarArgs, data: &Path) -> anyhow::Result<()> 
     print!("{table}");
     let report =
         Report { schema: SCHEMA, machine: Machine::this(), quick: args.quick, rows: &rows };
-    let text = serde_json::to_string_pretty(&report).context("figures are plain data")?;
-    for (path, text) in [(&args.json, text + "\n"), (&args.md, table)] {
-        if let Some(path) = path {
-            fs::write(path, text).with_context(|| {
-                format!("{}: cannot write; is the folder there?", path.display())
-            })?;
-        }
+    if let Some(path) = &args.json {
+        files::write_json(path, &report)?;
+    }
+    if let Some(path) = &args.md {
+        files::write(path, table)?;
     }
     Ok(())
 }
@@ -116,23 +115,13 @@ fn judge(
 ) -> anyhow::Result<Vec<Row>> {
     let mut rows = Vec::new();
     for task in [Task::Interpolation, Task::Extrapolation] {
-        let mut sums = [0.0_f64; 4];
-        let mut frames = 0;
+        let mut sum = ScoreSum::default();
         for test in subject.tests.iter().filter(|test| test.task == task) {
-            let predicted = fitted.posed(&test.params);
-            let scores = metrics::surface_metrics(&test.truth, &test.measured, &predicted)?;
-            let Some(scores) = scores else { continue };
-            let p2s_mm = metrics::p2s_mm(&test.truth, &predicted)?;
-            let values = [scores.d_p_cm, scores.d_f_cm, scores.nc, p2s_mm];
-            for (sum, value) in sums.iter_mut().zip(values) {
-                *sum += f64::from(value);
-            }
-            frames += 1;
+            sum.add(&test.truth, &test.measured, &fitted.posed(&test.params))?;
         }
-        if frames == 0 {
+        let Some(mean) = sum.mean() else {
             continue;
-        }
-        let mean = sums.map(|sum| sum / frames as f64);
+        };
         rows.push(Row {
             table: "few-shot",
             method,
@@ -142,11 +131,11 @@ fn judge(
             outfit: subject.outfit.clone(),
             subject: subject.name.clone(),
             task,
-            frames,
-            d_p_cm: mean[0],
-            d_f_cm: mean[1],
-            nc: mean[2],
-            p2s_mm: mean[3],
+            frames: sum.frames,
+            d_p_cm: mean.d_p_cm,
+            d_f_cm: mean.d_f_cm,
+            nc: mean.nc,
+            p2s_mm: mean.p2s_mm,
             seconds,
         });
     }

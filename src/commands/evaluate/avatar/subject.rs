@@ -10,7 +10,7 @@ use effigy_fusion::{TriangleMesh, clean::Cleaner};
 use effigy_registration::{BodyParams, RegisteredFrame, Tracking};
 use effigy_sim_sensor::dataset::{Dataset, Role, Sequence, SequenceEntry, Split, protocol_camera};
 
-use crate::pipeline::settings::Settings;
+use crate::pipeline::{evaluate::evenly_placed, settings::Settings};
 
 /// What a test frame tests.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
@@ -123,13 +123,11 @@ fn all_frames(sequences: &[Sequence]) -> Vec<(usize, usize)> {
 
 /// `count` items evenly spread, and the others.
 fn spread<T: Copy>(items: &[T], count: usize) -> (Vec<T>, Vec<T>) {
-    let count = count.min(items.len());
-    let chosen =
-        |index: usize| (0..count).any(|k| (2 * k + 1) * items.len() / (2 * count) == index);
+    let places = evenly_placed(items.len(), count);
     let (taken, left): (Vec<_>, Vec<_>) = items
         .iter()
         .enumerate()
-        .partition(|(index, _)| chosen(*index));
+        .partition(|(place, _)| places.binary_search(place).is_ok());
     let values = |pairs: Vec<(usize, &T)>| pairs.into_iter().map(|(_, &value)| value).collect();
     (values(taken), values(left))
 }

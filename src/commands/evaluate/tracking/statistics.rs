@@ -1,5 +1,7 @@
 //! Means, shares and percentiles; `None` of nothing.
 
+use crate::pipeline::clock;
+
 pub(super) fn mean(values: impl IntoIterator<Item = f32>) -> Option<f64> {
     let (mut sum, mut count) = (0.0_f64, 0_u64);
     for value in values {
@@ -25,14 +27,10 @@ pub(super) fn share<T>(
     )
 }
 
-/// The smallest value that at least this share of the values does not exceed.
+/// As [`clock::percentile`], of anything that gives numbers.
 pub(super) fn percentile(values: impl IntoIterator<Item = f32>, share: f64) -> Option<f64> {
-    let mut values: Vec<f32> = values.into_iter().collect();
-    values.sort_by(f32::total_cmp);
-    let rank = (share * values.len() as f64).ceil() as usize;
-    values
-        .get(rank.saturating_sub(1))
-        .map(|&value| f64::from(value))
+    let values: Vec<f32> = values.into_iter().collect();
+    clock::percentile(&values, share)
 }
 
 #[cfg(test)]

@@ -1,7 +1,10 @@
 //! Scores of people who are not SMPL's: twelve limb joints, less what skeletons disagree about.
 
 use effigy_capture::FrameId;
-use effigy_registration::{RegisteredFrame, smpl::JOINT_COUNT};
+use effigy_registration::{
+    RegisteredFrame,
+    smpl::{JOINT_COUNT, VertexWeights},
+};
 use effigy_sim_sensor::{
     StrangerTruth,
     stranger::{LIMB_JOINTS, LimbJoint},
@@ -22,19 +25,7 @@ pub(super) struct StrangerJudge<'a> {
 impl<'a> StrangerJudge<'a> {
     pub(super) fn new(judge: Judge<'a>, truth: StrangerTruth) -> Self {
         let weights = &truth.character().weights;
-        let parts = weights
-            .iter()
-            .map(|row| {
-                let largest = (1..4).fold(0, |best, slot| {
-                    if row.weights[slot] > row.weights[best] {
-                        slot
-                    } else {
-                        best
-                    }
-                });
-                row.bones[largest]
-            })
-            .collect();
+        let parts = weights.iter().map(VertexWeights::main_bone).collect();
         let judge = judge.with_parts(parts);
         Self { judge, truth, offsets: Vec::new(), scored: 0 }
     }

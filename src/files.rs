@@ -1,0 +1,35 @@
+//! Files that the program writes for its users: tried before the work, and with errors that say what to do.
+
+use std::{
+    fs::{self, OpenOptions},
+    io,
+    path::Path,
+};
+
+use anyhow::Context as _;
+use serde::Serialize;
+
+/// Fails now rather than after the work; an existing file stays as it is.
+pub(crate) fn check_writable(path: &Path) -> anyhow::Result<()> {
+    let opened = OpenOptions::new().append(true).create(true).open(path);
+    explained(opened.map(drop), path)
+}
+
+pub(crate) fn write(path: &Path, content: impl AsRef<[u8]>) -> anyhow::Result<()> {
+    explained(fs::write(path, content), path)
+}
+
+/// Pretty-printed JSON.
+pub(crate) fn write_json(path: &Path, value: &impl Serialize) -> anyhow::Result<()> {
+    let text = serde_json::to_string_pretty(value).context("what is reported is plain data")?;
+    write(path, text + "\n")
+}
+
+fn explained(result: io::Result<()>, path: &Path) -> anyhow::Result<()> {
+    result.with_context(|| {
+        format!(
+            "{}: cannot write there; is the folder there and writable?",
+            path.display()
+        )
+    })
+}
