@@ -51,9 +51,7 @@ pub(crate) enum Command {
     #[command(after_help = "Example: effigy dataset make --preset small --out data/small")]
     Dataset(DatasetArgs),
     /// Make the prior that ships with the program
-    #[command(
-        after_help = "Example: effigy train prior --out avatar/assets/prior_live.safetensors"
-    )]
+    #[command(after_help = "Example: effigy train sdf --data data/prior --out sdf.safetensors")]
     Train(TrainArgs),
     /// Measure how good a part of the program is, on a fixed suite
     #[command(
@@ -289,22 +287,63 @@ pub(crate) struct TrainArgs {
 
 #[derive(Debug, Subcommand)]
 pub(crate) enum TrainWhat {
-    /// Meta-learn the field and the hypernetwork over simulated people
-    #[command(after_help = "Example: effigy train prior --out prior.safetensors")]
-    Prior(TrainPriorArgs),
+    /// Meta-learn the field of a clothed person (the seed paper's algorithm B.1)
+    #[command(after_help = "Example: effigy train sdf --data data/prior --out sdf.safetensors")]
+    Sdf(TrainShared),
+    /// Meta-learn the hypernetwork that makes it follow the pose (algorithm B.2)
+    #[command(
+        after_help = "Example: effigy train hyper --data data/prior --start sdf.safetensors --out prior.safetensors"
+    )]
+    Hyper(TrainHyperArgs),
 }
 
 #[derive(Debug, Args)]
-pub(crate) struct TrainPriorArgs {
-    /// The file to write; a checkpoint beside it lets the run resume
+pub(crate) struct TrainHyperArgs {
+    /// The field to start from (`effigy train sdf`)
+    #[arg(long, value_name = "FILE")]
+    pub(crate) start: PathBuf,
+    #[command(flatten)]
+    pub(crate) shared: TrainShared,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct TrainShared {
+    /// The file to write; checkpoint, curves and pictures lie beside it
     #[arg(long)]
     pub(crate) out: PathBuf,
+    /// The data set whose training people are learned from (`effigy dataset make --preset prior`); people in simpler
+    /// clothes if there is none
+    #[arg(long, value_name = "DIR")]
+    pub(crate) data: Option<PathBuf>,
+    /// Beside a data set: one person of so many is in simpler clothes; 0 for none
+    #[arg(long, default_value_t = 0)]
+    pub(crate) offset_people: u64,
+    /// The networks' size; `paper` would take weeks
+    #[arg(long, value_enum, default_value = "live")]
+    pub(crate) preset: TrainPreset,
     /// Which people, poses and points
     #[arg(long, default_value_t = 1)]
     pub(crate) seed: u64,
     /// Go on from the checkpoint beside the output
     #[arg(long)]
     pub(crate) resume: bool,
+    /// Settings of the training (TOML); what it does not name keeps its default
+    #[arg(long, value_name = "FILE")]
+    pub(crate) config: Option<PathBuf>,
+}
+
+impl TrainShared {
+    pub(crate) fn checkpoint(&self) -> PathBuf {
+        self.out.with_extension("checkpoint")
+    }
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum TrainPreset {
+    /// What ships
+    Live,
+    /// `MetaAvatar`'s
+    Paper,
 }
 
 #[derive(Debug, Args)]

@@ -10,12 +10,11 @@ use std::{
     time::Duration,
 };
 
-use anyhow::{Context as _, anyhow, ensure};
+use anyhow::{Context as _, anyhow};
 use crossbeam::channel::{Receiver, Select, TryRecvError, bounded};
 use effigy_avatar::{
     Avatar, CanonicalSamples, Canonicaliser, TopologyConfig,
     fine_tune::{FineTuneProgress, fine_tune},
-    hyper,
     keyframes::Keyframe,
     nn::Threads,
 };
@@ -202,11 +201,7 @@ impl Work {
             .iter()
             .filter_map(|keyframe| Some(canonicaliser.process(&keyframe.frame)?.0))
             .collect();
-        let prior = hyper::prior();
-        ensure!(
-            prior.provenance.body == Some(self.body.identity),
-            "the shipped prior was made for another body; make one with `effigy train prior`"
-        );
+        let prior = self.settings.prior_network(self.body.identity)?;
         let metres_per_unit = canonicaliser.subject().unit_box.metres_per_unit();
         let tuning_started = self.clock.secs();
         let mut last = FineTuneProgress::default();

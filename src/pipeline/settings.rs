@@ -1,13 +1,19 @@
 //! All stages' settings in one file.
 
-use std::{fs, path::Path};
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
 
 use anyhow::{Context as _, ensure};
 use effigy_avatar::{
-    canonicalise::CanonicaliseConfig, fine_tune::FineTuneConfig, keyframes::KeyframeConfig,
+    canonicalise::CanonicaliseConfig,
+    fine_tune::FineTuneConfig,
+    hyper::{self, HyperNetwork},
+    keyframes::KeyframeConfig,
 };
 use effigy_fusion::clean::CleanConfig;
-use effigy_registration::track::TrackConfig;
+use effigy_registration::{smpl::BodyIdentity, track::TrackConfig};
 use serde::{Deserialize, Serialize};
 
 /// More would not be few shots any more, and fill the memory.
@@ -19,6 +25,8 @@ const MOST_THREADS: usize = 256;
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub(crate) struct Settings {
+    /// What fine-tuning starts from (`effigy train hyper`) instead of the built-in prior.
+    pub(crate) prior: Option<PathBuf>,
     pub(crate) clean: CleanConfig,
     pub(crate) track: TrackConfig,
     pub(crate) keyframes: KeyframeConfig,
@@ -61,6 +69,27 @@ impl Settings {
             .check()
             .with_context(|| path.display().to_string())?;
         Ok(settings)
+    }
+
+    /// The network that fine-tuning starts from; one of the user's own must belong to the body.
+    pub(crate) fn prior_network(&self, body: BodyIdentity) -> anyhow::Result<HyperNetwork> {
+        let (prior, name) = match &self.prior {
+            None => (hyper::prior(), "the built-in prior".to_owned()),
+            Some(path) => {
+                let name = path.display().to_string();
+                let bytes =
+                    fs::read(path).with_context(|| format!("{name}: cannot read the prior"))?;
+                (
+                    HyperNetwork::from_bytes(&bytes).with_context(|| name.clone())?,
+                    name,
+                )
+            }
+        };
+        ensure!(
+            prior.provenance.body == Some(body),
+            "{name} belongs to another body: make one with `effigy train sdf` and `effigy train hyper`"
+        );
+        Ok(prior)
     }
 
     /// Refuses what would run and mean nothing.

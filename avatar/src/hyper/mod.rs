@@ -6,7 +6,7 @@
 pub(crate) mod blob;
 mod config;
 pub(crate) mod heads;
-mod network;
+pub(crate) mod network;
 pub(crate) mod optimizer;
 pub(crate) mod pose_encoder;
 mod prior;

@@ -1,181 +1,141 @@
 //! The training's state as a file, exact to the last bit.
 
-use std::{collections::HashMap, fs, path::Path};
+use std::{
+    collections::{BTreeMap, HashMap},
+    fs,
+    path::{Path, PathBuf},
+};
 
 use safetensors::{Dtype, SafeTensors, serialize, tensor::TensorView};
 
-use super::{config::PriorConfig, joint::Joint, reptile::Reptile, task::PersonSource};
+use super::{
+    config::PriorConfig,
+    train::{Best, Learner, Stage},
+};
 use crate::{
     error::AvatarError,
     hyper::{HyperNetwork, Precision},
 };
 
-/// A stage and the steps it has done.
-pub(super) enum State {
-    Reptile { step: u32, reptile: Box<Reptile> },
-    Joint { step: u32, joint: Box<Joint> },
+/// Named parts of a stage's state.
+pub(super) type Vectors = BTreeMap<&'static str, Vec<u8>>;
+
+/// Where the best network so far is kept.
+const BEST: &str = "best";
+
+/// Every name that a stage may use.
+const NAMES: [&str; 7] = [
+    "parameters",
+    "mean",
+    "square",
+    "network",
+    "optimizer",
+    "codes",
+    "start",
+];
+
+/// A stage, the steps it has done, and its state.
+#[derive(Clone)]
+pub(super) struct Checkpoint {
+    path: PathBuf,
+    pub(super) stage: Stage,
+    pub(super) step: u32,
+    pub(super) best: Best,
+    pub(super) vectors: Vectors,
 }
 
-pub(super) fn reptile_bytes(
-    step: u32,
-    reptile: &Reptile,
-    config: &PriorConfig,
-) -> Result<Vec<u8>, AvatarError> {
-    let Reptile { parameters, moments, .. } = reptile;
-    let vectors = [
-        ("parameters", parameters),
-        ("mean", &moments.mean),
-        ("square", &moments.square),
-    ];
-    let vectors = vectors.map(|(name, values)| (name, Dtype::F32, bytes_of(values)));
-    to_bytes("reptile", step, config, &vectors)
-}
-
-pub(super) fn joint_bytes(
-    step: u32,
-    joint: &Joint,
-    config: &PriorConfig,
-) -> Result<Vec<u8>, AvatarError> {
-    let mut codes = Vec::new();
-    for ((code, moments), steps) in joint
-        .codes
-        .iter()
-        .zip(&joint.code_moments)
-        .zip(&joint.code_steps)
-    {
-        codes.extend(code.iter().chain(&moments.mean).chain(&moments.square));
-        codes.push(*steps as f32);
+impl Checkpoint {
+    pub(super) fn broken(&self, what: &str) -> AvatarError {
+        broken(&self.path, what)
     }
-    let vectors = [
-        (
-            "network",
-            Dtype::U8,
-            joint.network.to_bytes(Precision::F32)?,
-        ),
-        ("optimizer", Dtype::F32, bytes_of(&joint.optimizer.state())),
-        ("codes", Dtype::F32, bytes_of(&codes)),
-    ];
-    to_bytes("joint", step, config, &vectors)
+
+    pub(super) fn network(&self, name: &str) -> Result<HyperNetwork, AvatarError> {
+        let bytes = self.vectors.get(name);
+        HyperNetwork::from_bytes(bytes.ok_or_else(|| self.broken("a network is missing"))?)
+    }
 }
 
 /// Writes beside the file and renames, so that a crash leaves the old one.
-pub(super) fn write(path: &Path, bytes: &[u8]) -> Result<(), AvatarError> {
+pub(super) fn write<L: Learner>(
+    path: &Path,
+    stage: Stage,
+    step: u32,
+    best: &Best,
+    learner: &L,
+    config: &PriorConfig,
+) -> Result<(), AvatarError> {
+    let mut vectors = learner.vectors()?;
+    if let Some(network) = &best.network {
+        vectors.insert(BEST, network.to_bytes(Precision::F32)?);
+    }
+    let metadata = HashMap::from([
+        ("stage".to_owned(), json(&stage)),
+        ("step".to_owned(), step.to_string()),
+        ("config".to_owned(), json(config)),
+        // A float's shortest text brings back its bits.
+        ("best".to_owned(), json(&(best.held_out_mm, best.stale))),
+    ]);
+    let views = vectors
+        .iter()
+        .map(|(name, bytes)| Ok((*name, TensorView::new(Dtype::U8, vec![bytes.len()], bytes)?)))
+        .collect::<Result<Vec<_>, safetensors::SafeTensorError>>()
+        .map_err(AvatarError::WriteNetwork)?;
+    let bytes = serialize(views, Some(metadata)).map_err(AvatarError::WriteNetwork)?;
     let io = |source| AvatarError::Io { path: path.to_owned(), source };
     let partial = path.with_extension("partial");
     fs::write(&partial, bytes).map_err(io)?;
     fs::rename(&partial, path).map_err(io)
 }
 
-pub(super) fn read(
-    path: &Path,
-    config: &PriorConfig,
-    source: &dyn PersonSource,
-) -> Result<State, AvatarError> {
+pub(super) fn read(path: &Path, config: &PriorConfig) -> Result<Checkpoint, AvatarError> {
     let bytes =
         fs::read(path).map_err(|source| AvatarError::Io { path: path.to_owned(), source })?;
-    let broken =
-        |what: &str| AvatarError::Checkpoint { path: path.to_owned(), what: what.to_owned() };
     let (_, header) = SafeTensors::read_metadata(&bytes).map_err(AvatarError::ReadNetwork)?;
     let metadata = header.metadata().clone().unwrap_or_default();
-    if metadata.get("config") != Some(&config_json(config)) {
-        return Err(broken("it was written with another configuration"));
+    if metadata.get("config") != Some(&json(config)) {
+        return Err(broken(path, "it was written with another configuration"));
     }
-    let step = metadata.get("step").and_then(|step| step.parse().ok());
-    let step: u32 = step.ok_or_else(|| broken("its step is missing"))?;
-    let file = SafeTensors::deserialize(&bytes).map_err(AvatarError::ReadNetwork)?;
-    let floats = |name: &str| -> Result<Vec<f32>, AvatarError> {
-        let tensor = file.tensor(name).map_err(AvatarError::ReadNetwork)?;
-        Ok(tensor
-            .data()
-            .as_chunks()
-            .0
-            .iter()
-            .map(|b| f32::from_le_bytes(*b))
-            .collect())
+    let text = |key: &str| {
+        metadata
+            .get(key)
+            .ok_or_else(|| broken(path, &format!("its {key} is missing")))
     };
-    match metadata.get("stage").map(String::as_str) {
-        Some("reptile") => {
-            let mut reptile = Box::new(Reptile::new(config));
-            let moments = &mut reptile.moments;
-            let own = [
-                &mut reptile.parameters,
-                &mut moments.mean,
-                &mut moments.square,
-            ];
-            for (own, name) in own.into_iter().zip(["parameters", "mean", "square"]) {
-                let values = floats(name)?;
-                if values.len() != own.len() {
-                    return Err(broken("a vector has another length"));
-                }
-                *own = values;
-            }
-            Ok(State::Reptile { step, reptile })
-        }
-        Some("joint") => {
-            let network = file.tensor("network").map_err(AvatarError::ReadNetwork)?;
-            let network = HyperNetwork::from_bytes(network.data())?;
-            let mut joint = Box::new(Joint::new(network.meta.clone(), config, source));
-            joint.network = network;
-            let is_whole = joint.optimizer.restore(&floats("optimizer")?)
-                && restore_codes(&mut joint, &floats("codes")?);
-            if is_whole {
-                Ok(State::Joint { step, joint })
-            } else {
-                Err(broken("a vector has another length"))
-            }
-        }
-        _ => Err(broken("its stage is unknown")),
-    }
+    let unclear = |_: serde_json::Error| broken(path, "its description cannot be read");
+    let stage = serde_json::from_str(text("stage")?).map_err(unclear)?;
+    let step = serde_json::from_str(text("step")?).map_err(unclear)?;
+    let (held_out_mm, stale) = serde_json::from_str(text("best")?).map_err(unclear)?;
+    let file = SafeTensors::deserialize(&bytes).map_err(AvatarError::ReadNetwork)?;
+    let vectors = NAMES
+        .into_iter()
+        .filter_map(|name| Some((name, file.tensor(name).ok()?.data().to_vec())))
+        .collect();
+    let network = match file.tensor(BEST) {
+        Ok(best) => Some(HyperNetwork::from_bytes(best.data())?),
+        Err(_) => None,
+    };
+    let best = Best { held_out_mm, network, stale };
+    Ok(Checkpoint { path: path.to_owned(), stage, step, best, vectors })
 }
 
-fn restore_codes(joint: &mut Joint, values: &[f32]) -> bool {
-    let size = joint.network.code_size();
-    let row = 3 * size + 1;
-    if values.len() != joint.codes.len() * row {
-        return false;
-    }
-    for (person, row) in values.chunks_exact(row).enumerate() {
-        joint.codes[person].copy_from_slice(&row[..size]);
-        joint.code_moments[person]
-            .mean
-            .copy_from_slice(&row[size..2 * size]);
-        joint.code_moments[person]
-            .square
-            .copy_from_slice(&row[2 * size..3 * size]);
-        joint.code_steps[person] = row[3 * size] as u32;
-    }
-    true
-}
-
-fn to_bytes(
-    stage: &str,
-    step: u32,
-    config: &PriorConfig,
-    vectors: &[(&str, Dtype, Vec<u8>)],
-) -> Result<Vec<u8>, AvatarError> {
-    let metadata = HashMap::from([
-        ("stage".to_owned(), stage.to_owned()),
-        ("step".to_owned(), step.to_string()),
-        ("config".to_owned(), config_json(config)),
-    ]);
-    let views = vectors
-        .iter()
-        .map(|(name, dtype, bytes)| {
-            let size = if *dtype == Dtype::U8 { 1 } else { 4 };
-            Ok((
-                *name,
-                TensorView::new(*dtype, vec![bytes.len() / size], bytes)?,
-            ))
-        })
-        .collect::<Result<Vec<_>, safetensors::SafeTensorError>>()
-        .map_err(AvatarError::WriteNetwork)?;
-    serialize(views, Some(metadata)).map_err(AvatarError::WriteNetwork)
-}
-
-fn config_json(config: &PriorConfig) -> String {
-    serde_json::to_string(config).expect("plain data serialises")
-}
-
-fn bytes_of(values: &[f32]) -> Vec<u8> {
+pub(super) fn bytes_of(values: &[f32]) -> Vec<u8> {
     values.iter().flat_map(|x| x.to_le_bytes()).collect()
+}
+
+/// A named vector of numbers; empty if it is not there.
+pub(super) fn floats(vectors: &Vectors, name: &str) -> Vec<f32> {
+    let bytes = vectors.get(name).map_or(&[][..], Vec::as_slice);
+    bytes
+        .as_chunks()
+        .0
+        .iter()
+        .map(|b| f32::from_le_bytes(*b))
+        .collect()
+}
+
+fn broken(path: &Path, what: &str) -> AvatarError {
+    AvatarError::Checkpoint { path: path.to_owned(), what: what.to_owned() }
+}
+
+fn json(value: &impl serde::Serialize) -> String {
+    serde_json::to_string(value).expect("plain data serialises")
 }

@@ -20,9 +20,14 @@ pub struct PriorConfig {
     pub sampling: SamplingConfig,
     pub reptile: ReptileConfig,
     pub joint: JointConfig,
+    pub adapt: AdaptConfig,
     pub threads: ThreadsConfig,
     /// Steps between two checkpoints.
     pub checkpoint_every: u32,
+    /// Share of a stage's steps between two validations.
+    pub validate_share: f32,
+    /// A stage ends early when so many validations in a row were not better than the best.
+    pub patience: u32,
 }
 
 impl Default for PriorConfig {
@@ -41,13 +46,16 @@ impl Default for PriorConfig {
             },
             reptile: ReptileConfig::default(),
             joint: JointConfig::default(),
+            adapt: AdaptConfig::default(),
             threads: ThreadsConfig::default(),
             checkpoint_every: 500,
+            validate_share: 0.1,
+            patience: 4,
         }
     }
 }
 
-/// Stage 1: the meta-learned field.
+/// The field alone.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct ReptileConfig {
@@ -79,7 +87,7 @@ impl Default for ReptileConfig {
     }
 }
 
-/// Stage 2: the hypernetwork.
+/// The hypernetwork, over all people together.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct JointConfig {
@@ -119,4 +127,46 @@ impl Default for JointConfig {
             decay_share: 0.5,
         }
     }
+}
+
+/// The hypernetwork again: to be a good start for fine-tuning.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct AdaptConfig {
+    pub outer_steps: u32,
+    pub outer: OuterStep,
+    /// People of one outer step, one after the other.
+    pub people: usize,
+    /// Frames of each to adapt to, seen from one side each, and as many others to be judged on.
+    pub frames: usize,
+    /// Fine-tuning steps on each.
+    pub inner_steps: u32,
+    pub inner_rates: RateConfig,
+    /// Inner rates fall to zero over this share of the inner steps.
+    pub inner_decay_share: f32,
+}
+
+impl Default for AdaptConfig {
+    fn default() -> Self {
+        Self {
+            outer_steps: 0,
+            outer: OuterStep::FirstOrder { rate: 1e-4 },
+            people: 1,
+            frames: 8,
+            inner_steps: 24,
+            inner_rates: RateConfig { field: 4e-4, ..RateConfig::default() },
+            inner_decay_share: 0.5,
+        }
+    }
+}
+
+/// What an outer step learns from having adapted.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum OuterStep {
+    /// Goes this share of the way to the adapted network (Reptile, algorithm B.2 of the seed paper).
+    Reptile { share: f32 },
+    /// An Adam step that moves the field by `rate`, along the gradient which the adapted network has on whole
+    /// surfaces in other poses (first-order MAML, Finn et al. 2017).
+    FirstOrder { rate: f32 },
 }

@@ -1,4 +1,4 @@
-//! Stage 2: one hypernetwork for many people, each with a code of their own.
+//! Stage `Joint`: one hypernetwork for many people, each with a code of their own.
 //!
 //! A person's code is added to the coefficients of every head, so that the shared basis spans both how people
 //! differ and how their surfaces follow the pose. Fine-tuning finds a new person's code in the coefficients'
@@ -9,13 +9,15 @@ use rand::{RngExt as _, rngs::StdRng, seq::SliceRandom as _};
 use rayon::prelude::*;
 
 use super::{
+    checkpoint::{Vectors, bytes_of, floats},
     config::PriorConfig,
     reptile::{person_number, rng_of},
     task::{PersonSource, Prepared},
+    train::{Learner, Stage},
 };
 use crate::{
     error::AvatarError,
-    hyper::{HyperNetwork, optimizer::HyperOptimizer},
+    hyper::{HyperNetwork, Precision, optimizer::HyperOptimizer},
     nn::{AdamConfig, AdamStep, adam::Moments},
     sdf::{
         SirenField,
@@ -24,15 +26,15 @@ use crate::{
     },
 };
 
-/// Stage 2 in progress.
+/// The stage in progress.
 pub(super) struct Joint {
-    pub(super) network: HyperNetwork,
-    pub(super) optimizer: HyperOptimizer,
+    network: HyperNetwork,
+    optimizer: HyperOptimizer,
     /// One a person: the coefficients of all heads, one after the other.
-    pub(super) codes: Vec<Vec<f32>>,
-    pub(super) code_moments: Vec<Moments>,
+    codes: Vec<Vec<f32>>,
+    code_moments: Vec<Moments>,
     /// Steps each code has taken.
-    pub(super) code_steps: Vec<u32>,
+    code_steps: Vec<u32>,
     people: Vec<Prepared>,
     gradients: FieldGradients,
     points: Vec<Vec<Vec3>>,
@@ -65,8 +67,78 @@ impl Joint {
         }
     }
 
-    /// One step by its number; the loss before it.
-    pub(super) fn step(&mut self, number: u32, config: &PriorConfig) -> Result<f64, AvatarError> {
+    /// Persons and frames of one step.
+    fn choose(&self, config: &PriorConfig, rng: &mut StdRng) -> Vec<(usize, usize)> {
+        let mut people: Vec<usize> = (0..self.people.len()).collect();
+        let (chosen, _) = people.partial_shuffle(rng, config.joint.people_per_step);
+        let mut list = Vec::new();
+        for &mut person in chosen {
+            let frames = self.people[person].poses.len();
+            for _ in 0..config.joint.frames_per_person {
+                list.push((person, rng.random_range(0..frames)));
+            }
+        }
+        list
+    }
+
+    fn restore_codes(&mut self, values: &[f32]) -> bool {
+        let size = self.network.code_size();
+        let row = 3 * size + 1;
+        if values.len() != self.codes.len() * row {
+            return false;
+        }
+        for (person, row) in values.chunks_exact(row).enumerate() {
+            self.codes[person].copy_from_slice(&row[..size]);
+            let moments = &mut self.code_moments[person];
+            moments.mean.copy_from_slice(&row[size..2 * size]);
+            moments.square.copy_from_slice(&row[2 * size..3 * size]);
+            self.code_steps[person] = row[3 * size] as u32;
+        }
+        true
+    }
+
+    fn step_codes(
+        &mut self,
+        chosen: &[(usize, usize)],
+        bars: &[Vec<f32>],
+        config: &PriorConfig,
+        share: f32,
+    ) {
+        let joint = &config.joint;
+        let rows = chosen
+            .chunks(joint.frames_per_person)
+            .zip(bars.chunks(joint.frames_per_person));
+        for (frames, bars) in rows {
+            let person = frames[0].0;
+            let code = &mut self.codes[person];
+            let penalty = 2.0 * joint.code_penalty / code.len() as f32;
+            let mut gradient: Vec<f32> = code.iter().map(|x| penalty * x).collect();
+            for bar in bars {
+                gradient
+                    .iter_mut()
+                    .zip(bar)
+                    .for_each(|(sum, bar)| *sum += bar);
+            }
+            self.code_steps[person] += 1;
+            let step = AdamStep::new(AdamConfig::default(), self.code_steps[person]);
+            self.code_moments[person].step(&step, joint.code_rate * share, &gradient, code);
+        }
+    }
+}
+
+impl Learner for Joint {
+    const STAGE: Stage = Stage::Joint;
+
+    fn steps(config: &PriorConfig) -> u32 {
+        config.joint.steps
+    }
+
+    fn step(
+        &mut self,
+        number: u32,
+        config: &PriorConfig,
+        _source: &dyn PersonSource,
+    ) -> Result<f64, AvatarError> {
         let mut rng = rng_of(config.seed ^ 0x5eed, u64::from(number));
         let chosen = self.choose(config, &mut rng);
         let poses: Vec<_> = chosen
@@ -104,58 +176,43 @@ impl Joint {
         Ok(terms.total())
     }
 
-    /// The network with the mean code in its coefficients' biases.
-    pub(super) fn finish(mut self) -> HyperNetwork {
+    /// With the mean code in the coefficients' biases.
+    fn network(&self, _config: &PriorConfig) -> HyperNetwork {
         let mut mean = vec![0.0; self.network.code_size()];
         for code in &self.codes {
             mean.iter_mut()
                 .zip(code)
                 .for_each(|(sum, x)| *sum += x / self.codes.len() as f32);
         }
-        self.network.add_code(&mean);
-        self.network
+        let mut network = self.network.clone();
+        network.add_code(&mean);
+        network
     }
 
-    /// Persons and frames of one step.
-    fn choose(&self, config: &PriorConfig, rng: &mut StdRng) -> Vec<(usize, usize)> {
-        let mut people: Vec<usize> = (0..self.people.len()).collect();
-        let (chosen, _) = people.partial_shuffle(rng, config.joint.people_per_step);
-        let mut list = Vec::new();
-        for &mut person in chosen {
-            let frames = self.people[person].poses.len();
-            for _ in 0..config.joint.frames_per_person {
-                list.push((person, rng.random_range(0..frames)));
-            }
+    fn vectors(&self) -> Result<Vectors, AvatarError> {
+        let mut codes = Vec::new();
+        let moments = self.code_moments.iter().zip(&self.code_steps);
+        for (code, (moments, steps)) in self.codes.iter().zip(moments) {
+            codes.extend(code.iter().chain(&moments.mean).chain(&moments.square));
+            codes.push(*steps as f32);
         }
-        list
+        Ok(Vectors::from([
+            ("network", self.network.to_bytes(Precision::F32)?),
+            ("optimizer", bytes_of(&self.optimizer.state())),
+            ("codes", bytes_of(&codes)),
+        ]))
     }
 
-    fn step_codes(
-        &mut self,
-        chosen: &[(usize, usize)],
-        bars: &[Vec<f32>],
-        config: &PriorConfig,
-        share: f32,
-    ) {
-        let joint = &config.joint;
-        let rows = chosen
-            .chunks(joint.frames_per_person)
-            .zip(bars.chunks(joint.frames_per_person));
-        for (frames, bars) in rows {
-            let person = frames[0].0;
-            let code = &mut self.codes[person];
-            let penalty = 2.0 * joint.code_penalty / code.len() as f32;
-            let mut gradient: Vec<f32> = code.iter().map(|x| penalty * x).collect();
-            for bar in bars {
-                gradient
-                    .iter_mut()
-                    .zip(bar)
-                    .for_each(|(sum, bar)| *sum += bar);
-            }
-            self.code_steps[person] += 1;
-            let step = AdamStep::new(AdamConfig::default(), self.code_steps[person]);
-            self.code_moments[person].step(&step, joint.code_rate * share, &gradient, code);
+    fn restore(&mut self, vectors: &Vectors) -> Result<bool, AvatarError> {
+        let network = vectors.get("network").map_or(&[][..], Vec::as_slice);
+        let network = HyperNetwork::from_bytes(network)?;
+        // The field that the stage starts from is the caller's.
+        if network.config() != self.network.config() || network.meta != self.network.meta {
+            return Ok(false);
         }
+        self.network = network;
+        Ok(self.optimizer.restore(&floats(vectors, "optimizer"))
+            && self.restore_codes(&floats(vectors, "codes")))
     }
 }
 

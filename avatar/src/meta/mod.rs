@@ -1,10 +1,11 @@
 //! Meta-learning of the prior over many people.
 //!
-//! Stage 1 (Reptile) finds `phi*`, a field from which any clothed person is a few steps away. Stage 2 teaches
-//! the hypernetwork how people's surfaces follow their poses: all people share it, each has a code of their
-//! own in the coefficients, and `phi*` stays as it is. People come from the caller: this crate knows no
-//! simulator.
+//! `Field` (Reptile) finds `phi*`, a field from which any clothed person is a few steps away. `Joint` teaches the
+//! hypernetwork how people's surfaces follow their poses: all people share it, each has a code of their own in
+//! the coefficients, and `phi*` stays as it is. `Adapt` makes of it a start from which fine-tuning to eight
+//! single views ends well. People come from the caller: this crate knows no simulator.
 
+mod adapt;
 mod checkpoint;
 mod config;
 mod joint;
@@ -13,7 +14,11 @@ mod task;
 #[cfg(test)]
 mod tests;
 mod train;
+mod validation;
 
-pub use config::{JointConfig, PriorConfig, ReptileConfig};
+pub use config::{AdaptConfig, JointConfig, OuterStep, PriorConfig, ReptileConfig};
 pub use task::{Person, PersonFrame, PersonSource};
-pub use train::{PriorProgress, Stage, train_prior};
+pub use train::{
+    PriorProgress, Stage, TrainEvent, Training, time_one_step, train_field, train_hyper,
+};
+pub use validation::{HeldOut, Validated, Validation};

@@ -1,4 +1,4 @@
-//! Stage 1: Reptile (Nichol et al. 2018) on the field alone.
+//! Stage `Field`: Reptile (Nichol et al. 2018) on the field alone.
 //!
 //! An outer step adapts the field to some people with a few Adam steps each, and moves the start part of the
 //! way to the mean of where they ended.
@@ -10,11 +10,14 @@ use rand::{RngExt as _, SeedableRng as _, rngs::StdRng};
 use rayon::prelude::*;
 
 use super::{
+    checkpoint::{Vectors, bytes_of, floats},
     config::PriorConfig,
     task::{PersonSource, Prepared},
+    train::{Learner, Stage},
 };
 use crate::{
     error::AvatarError,
+    hyper::HyperNetwork,
     nn::{AdamConfig, AdamStep, adam::Moments},
     sdf::{
         SirenField,
@@ -23,10 +26,10 @@ use crate::{
     },
 };
 
-/// Stage 1 in progress; its whole state is the field, the warm-up's moments and the step number.
+/// The stage in progress; the whole state is the field, the warm-up's moments and the step number.
 pub(super) struct Reptile {
-    pub(super) parameters: Vec<f32>,
-    pub(super) moments: Moments,
+    parameters: Vec<f32>,
+    moments: Moments,
     cohort: Option<(u32, Arc<Vec<Prepared>>)>,
     gradients: FieldGradients,
     points: Vec<Vec<Vec3>>,
@@ -48,20 +51,6 @@ impl Reptile {
             gradients: FieldGradients::new(config.network.field),
             points: Vec::new(),
             known: Vec::new(),
-        }
-    }
-
-    /// One step, warm-up or outer, by its number; the mean loss.
-    pub(super) fn step(
-        &mut self,
-        number: u32,
-        config: &PriorConfig,
-        source: &dyn PersonSource,
-    ) -> Result<f64, AvatarError> {
-        if number < config.reptile.warm_up_steps {
-            self.warm_up(number, config, source)
-        } else {
-            self.outer(number, config, source)
         }
     }
 
@@ -182,6 +171,55 @@ impl Reptile {
         } else {
             Err(AvatarError::LossNotFinite { step: number, terms })
         }
+    }
+}
+
+impl Learner for Reptile {
+    const STAGE: Stage = Stage::Field;
+
+    fn steps(config: &PriorConfig) -> u32 {
+        config.reptile.warm_up_steps + config.reptile.outer_steps
+    }
+
+    /// Warm-up or outer.
+    fn step(
+        &mut self,
+        number: u32,
+        config: &PriorConfig,
+        source: &dyn PersonSource,
+    ) -> Result<f64, AvatarError> {
+        if number < config.reptile.warm_up_steps {
+            self.warm_up(number, config, source)
+        } else {
+            self.outer(number, config, source)
+        }
+    }
+
+    fn network(&self, config: &PriorConfig) -> HyperNetwork {
+        let field = SirenField::new(config.network.field, self.parameters.clone());
+        HyperNetwork::init(config.network, &field, &mut rng_of(config.seed, u64::MAX))
+    }
+
+    fn vectors(&self) -> Result<Vectors, AvatarError> {
+        let Self { parameters, moments, .. } = self;
+        Ok(Vectors::from([
+            ("parameters", bytes_of(parameters)),
+            ("mean", bytes_of(&moments.mean)),
+            ("square", bytes_of(&moments.square)),
+        ]))
+    }
+
+    fn restore(&mut self, vectors: &Vectors) -> Result<bool, AvatarError> {
+        let Moments { mean, square } = &mut self.moments;
+        let own = [&mut self.parameters, mean, square];
+        for (own, name) in own.into_iter().zip(["parameters", "mean", "square"]) {
+            let values = floats(vectors, name);
+            if values.len() != own.len() {
+                return Ok(false);
+            }
+            *own = values;
+        }
+        Ok(true)
     }
 }
 

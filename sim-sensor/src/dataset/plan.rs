@@ -17,6 +17,8 @@ pub enum DatasetPreset {
     Prior,
     /// In the manner of CAPE: ten people to learn from, four to fine-tune and test on, actions split as in MetaAvatar.
     CapeLike,
+    /// To choose settings by: three people whom neither training nor the tests ever meet.
+    Dev,
     /// A miniature for tests.
     Small,
 }
@@ -104,6 +106,7 @@ impl DatasetPlan {
         let (offset_step_m, sequences) = match preset {
             DatasetPreset::Prior => (1e-3, prior(seed)),
             DatasetPreset::CapeLike => (0.25e-3, cape_like(seed)),
+            DatasetPreset::Dev => (0.25e-3, dev(seed)),
             DatasetPreset::Small => (0.25e-3, small(seed)),
         };
         Self { preset, seed, offset_step_m, sequences }
@@ -167,6 +170,28 @@ fn cape_like(seed: u64) -> Vec<SequencePlan> {
                     TEST_FRAMES,
                 ));
             }
+        }
+    }
+    sequences
+}
+
+/// People of the test split's kind, but not those of [`cape_like`].
+fn dev(seed: u64) -> Vec<SequencePlan> {
+    const FIRST_SUBJECT: u32 = 100;
+    const FRAMES: u32 = 12;
+    let outfits = [
+        OutfitKind::TshirtTrousers,
+        OutfitKind::LongsleeveWideTrousers,
+        OutfitKind::Dress,
+    ];
+    let mut sequences = Vec::new();
+    for (subject, outfit) in (FIRST_SUBJECT..).zip(outfits) {
+        let wearer = Wearer { split: Split::Test, subject, outfit };
+        for action in FINE_TUNE_ACTIONS {
+            sequences.push(sequence(seed, wearer, action, Role::FineTune, FRAMES));
+        }
+        for action in EXTRAPOLATED_ACTIONS {
+            sequences.push(sequence(seed, wearer, action, Role::Extrapolation, FRAMES));
         }
     }
     sequences

@@ -1,6 +1,6 @@
 //! `effigy evaluate`: how good a part of the program is, on a fixed suite, as one file of numbers.
 
-mod avatar;
+pub(crate) mod avatar;
 pub(crate) mod tracking;
 
 use anyhow::bail;

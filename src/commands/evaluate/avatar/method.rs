@@ -7,7 +7,7 @@ use effigy_avatar::{
     Avatar, CanonicalSamples, Canonicaliser, PoseField, PoseInput, SignedDistanceField,
     TopologyConfig, extract_posed,
     fine_tune::{FineTuneConfig, fine_tune},
-    hyper::{self, HyperNetwork, PRIOR_CONFIG},
+    hyper::{HyperNetwork, PRIOR_CONFIG},
 };
 use effigy_fusion::{TriangleMesh, mesh::sample::sample_surface};
 use effigy_registration::{BodyModel, BodyParams};
@@ -105,20 +105,21 @@ pub(super) fn fit(
             .collect()
     };
     let one_pose = canonicaliser.subject().pose_input(&params.theta);
+    let prior = || settings.prior_network(body.identity);
     let mut tuning = settings.fine_tune;
     let (start, samples) = match method {
         Method::Oracle => {
             tuning.steps *= ORACLE_STEPS_FACTOR;
-            (hyper::prior(), whole_surfaces(subject, &canonicaliser))
+            (prior()?, whole_surfaces(subject, &canonicaliser))
         }
         Method::NoMetaLearning => (HyperNetwork::untrained(PRIOR_CONFIG, tuning.seed), seen()),
         Method::Static => {
             let in_one_pose = seen()
                 .into_iter()
                 .map(|samples| CanonicalSamples { pose: one_pose, ..samples });
-            (hyper::prior(), in_one_pose.collect())
+            (prior()?, in_one_pose.collect())
         }
-        Method::Effigy | Method::BareBody => (hyper::prior(), seen()),
+        Method::Effigy | Method::BareBody => (prior()?, seen()),
     };
     let network = tuned(start, &samples, &canonicaliser, &tuning, clock)?;
     let field: Arc<dyn PoseField> = if method == Method::Static {

@@ -1,7 +1,7 @@
 //! MetaAvatar's protocol on our test people: eight single views in true poses, then frames nobody has seen.
 
 mod method;
-mod subject;
+pub(crate) mod subject;
 
 use std::{fmt::Write as _, path::Path};
 

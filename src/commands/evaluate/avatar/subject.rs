@@ -133,7 +133,7 @@ fn spread<T: Copy>(items: &[T], count: usize) -> (Vec<T>, Vec<T>) {
 }
 
 /// A frame as the protocol's camera sees it, with the true pose.
-fn seen(
+pub(crate) fn seen(
     sequence: &Sequence,
     (frame, yaw_rad): (usize, f32),
     number: usize,
@@ -155,7 +155,7 @@ fn seen(
     Ok(RegisteredFrame { clean, world_from_camera, tracking })
 }
 
-fn protocol_calibration() -> Calibration {
+pub(crate) fn protocol_calibration() -> Calibration {
     let (intrinsics, _) = protocol_camera();
     Calibration {
         sensor_name: "MetaAvatar's protocol".to_owned(),

@@ -1,0 +1,218 @@
+//! `effigy train`: how the shipped prior is made.
+
+mod curve;
+mod estimate;
+mod held_out;
+mod people;
+mod report;
+
+use std::{fs, path::Path, sync::Arc};
+
+use anyhow::{Context as _, bail};
+use effigy_avatar::{
+    hyper::{HyperConfig, HyperNetwork, Precision, Provenance},
+    meta::{PersonSource, PriorConfig, Training, Validation, train_field, train_hyper},
+};
+use effigy_registration::{BodyModel, smpl::builtin};
+use effigy_sim_sensor::dataset::{Dataset, Split};
+
+use self::{
+    held_out::{Judge, is_held_out},
+    people::{ClothPeople, OffsetPeople, People},
+    report::Reporter,
+};
+use crate::{
+    cli::{TrainArgs, TrainHyperArgs, TrainPreset, TrainShared, TrainWhat},
+    files,
+    pipeline::settings::Settings,
+};
+
+pub(crate) fn run(args: &TrainArgs) -> anyhow::Result<()> {
+    match &args.what {
+        TrainWhat::Sdf(args) => field(args),
+        TrainWhat::Hyper(args) => hyper(args),
+    }
+}
+
+fn field(args: &TrainShared) -> anyhow::Result<()> {
+    let job = Job::new(args)?;
+    estimate::say_field(&job.config);
+    let trained = job.run(train_field)?;
+    job.finish(trained, "sdf", Precision::F32)
+}
+
+fn hyper(args: &TrainHyperArgs) -> anyhow::Result<()> {
+    let job = Job::new(&args.shared)?;
+    let start = read_start(&args.start, &job)?;
+    estimate::say_hyper(&job.config);
+    let trained = job.run(|training| train_hyper(&start, training))?;
+    job.finish(
+        trained,
+        &format!("sdf and hyper --start {}", args.start.display()),
+        Precision::F16,
+    )
+}
+
+/// The field to start from.
+fn read_start(path: &Path, job: &Job<'_>) -> anyhow::Result<HyperNetwork> {
+    let bytes = fs::read(path).with_context(|| {
+        format!(
+            "{}: cannot read the field to start from; make it with `effigy train sdf`",
+            path.display()
+        )
+    })?;
+    let start = HyperNetwork::from_bytes(&bytes).with_context(|| path.display().to_string())?;
+    if start.config() != job.config.network {
+        bail!(
+            "{}: its networks are {:?}, expected {:?}; make it with the same --preset",
+            path.display(),
+            start.config(),
+            job.config.network
+        );
+    }
+    if start.provenance.body != Some(job.body.identity) {
+        bail!(
+            "{}: it belongs to another body model; make it again",
+            path.display()
+        );
+    }
+    Ok(start)
+}
+
+/// What both trainings need.
+struct Job<'a> {
+    args: &'a TrainShared,
+    body: Arc<BodyModel>,
+    config: PriorConfig,
+    people: People,
+    judges: Vec<Judge>,
+}
+
+impl<'a> Job<'a> {
+    fn new(args: &'a TrainShared) -> anyhow::Result<Self> {
+        let checkpoint = args.checkpoint();
+        if checkpoint.exists() && !args.resume {
+            bail!(
+                "{}: a checkpoint is there; go on from it with --resume, or delete it",
+                checkpoint.display()
+            );
+        }
+        files::check_writable(&checkpoint.with_extension("partial"))?;
+        let body = builtin::body();
+        let (people, judges) = people(args, &body)?;
+        println!(
+            "{} people to learn from in cloth, mirror images included; {} to judge; seed {}",
+            people.cloth.as_ref().map_or(0, ClothPeople::count),
+            judges.len(),
+            args.seed
+        );
+        let mut config = config(args)?;
+        config.seed = args.seed;
+        Ok(Self { args, body, config, people, judges })
+    }
+
+    fn run(
+        &self,
+        train: impl FnOnce(Training<'_>) -> Result<Option<HyperNetwork>, effigy_avatar::AvatarError>,
+    ) -> anyhow::Result<Option<HyperNetwork>> {
+        let people = self.judges.iter().map(|judge| judge.held_out.clone());
+        let validation = Validation::new(people.collect());
+        let checkpoint = self.args.checkpoint();
+        let mut reporter = Reporter::new(&self.args.out, &self.judges);
+        let source: &dyn PersonSource = &self.people;
+        let trained = train(Training {
+            source,
+            config: &self.config,
+            validation: (!self.judges.is_empty()).then_some(&validation),
+            checkpoint: Some(&checkpoint),
+            on_event: &mut |event| reporter.take(event),
+        })
+        .with_context(|| {
+            format!(
+                "training stopped; {} holds the last good state",
+                checkpoint.display()
+            )
+        })?;
+        reporter.finish()?;
+        Ok(trained)
+    }
+
+    fn finish(
+        &self,
+        trained: Option<HyperNetwork>,
+        what: &str,
+        precision: Precision,
+    ) -> anyhow::Result<()> {
+        let checkpoint = self.args.checkpoint();
+        let Some(mut network) = trained else {
+            println!("stopped; `--resume` goes on from {}", checkpoint.display());
+            return Ok(());
+        };
+        let data = &self.people.described;
+        network.provenance = Provenance {
+            body: Some(self.body.identity),
+            training: format!("effigy train {what}, --seed {}, {data}", self.args.seed),
+            is_placeholder: false,
+        };
+        let bytes = network.to_bytes(precision)?;
+        files::write(&self.args.out, &bytes)?;
+        fs::remove_file(&checkpoint).ok();
+        println!("{}: {} bytes", self.args.out.display(), bytes.len());
+        Ok(())
+    }
+}
+
+/// Those who teach, and those who judge.
+fn people(args: &TrainShared, body: &Arc<BodyModel>) -> anyhow::Result<(People, Vec<Judge>)> {
+    let offsets = OffsetPeople { body: Arc::clone(body), seed: args.seed };
+    let Some(path) = &args.data else {
+        let described = "people in offset clothes".to_owned();
+        return Ok((
+            People { cloth: None, offsets, one_in: 1, described },
+            Vec::new(),
+        ));
+    };
+    let dataset = Dataset::open(path, body)?;
+    let settings = Settings::default();
+    let all = dataset.manifest().sequences.iter();
+    let (mut teachers, mut judges) = (Vec::new(), Vec::new());
+    for (index, entry) in all
+        .filter(|entry| entry.plan.split == Split::Train)
+        .enumerate()
+    {
+        if is_held_out(index) {
+            judges.push(Judge::new(&dataset.load(entry)?, body, &settings)?);
+        } else {
+            teachers.push(entry);
+        }
+    }
+    if teachers.is_empty() {
+        bail!(
+            "{}: nobody in it is there to learn from; make one with `effigy dataset make --preset prior`",
+            path.display()
+        );
+    }
+    let cloth = ClothPeople::load(&dataset, &teachers, body)?;
+    let manifest = dataset.manifest();
+    let described = format!("data set {:?} of seed {}", manifest.preset, manifest.seed);
+    Ok((
+        People { cloth: Some(cloth), offsets, one_in: args.offset_people, described },
+        judges,
+    ))
+}
+
+fn config(args: &TrainShared) -> anyhow::Result<PriorConfig> {
+    let mut config = match &args.config {
+        Some(path) => {
+            let text = fs::read_to_string(path)
+                .with_context(|| format!("{}: cannot read the settings", path.display()))?;
+            toml::from_str(&text)
+                .with_context(|| format!("{}: these settings do not fit", path.display()))?
+        }
+        None => PriorConfig::default(),
+    };
+    if args.preset == TrainPreset::Paper {
+        config.network = HyperConfig::PAPER;
+    }
+    Ok(config)
+}

@@ -1,0 +1,193 @@
+//! The people that a prior is learned from: those of a data set, and simpler ones made as they are asked for.
+
+use std::sync::Arc;
+
+use effigy_avatar::{
+    Subject,
+    meta::{Person, PersonFrame, PersonSource},
+};
+use effigy_fusion::{TriangleMesh, mesh::sample::sample_surface};
+use effigy_registration::{
+    BodyModel,
+    smpl::{JOINT_COUNT, mirror::MIRROR_JOINT},
+};
+use effigy_sim_sensor::{
+    dataset::{Dataset, Sequence, SequenceEntry},
+    population,
+};
+use glam::Vec3;
+use rayon::prelude::*;
+
+/// Points kept of each simulated surface.
+const POINTS_PER_FRAME: usize = 2500;
+
+/// A person's surfaces, and who they are in numbers.
+struct Learned {
+    subject: Subject,
+    frames: Vec<LearnedFrame>,
+}
+
+pub(super) struct LearnedFrame {
+    theta: [Vec3; JOINT_COUNT],
+    /// In unit space, with unit normals.
+    points: Vec<(Vec3, Vec3)>,
+}
+
+/// Training people of a data set, each as they are and as their mirror image.
+pub(super) struct ClothPeople {
+    people: Vec<Learned>,
+}
+
+impl ClothPeople {
+    pub(super) fn load(
+        dataset: &Dataset,
+        entries: &[&SequenceEntry],
+        body: &BodyModel,
+    ) -> anyhow::Result<Self> {
+        let people = entries
+            .par_iter()
+            .map(|entry| learned(&dataset.load(entry)?, body))
+            .collect::<anyhow::Result<_>>()?;
+        Ok(Self { people })
+    }
+
+    /// People, mirror images included.
+    pub(super) fn count(&self) -> usize {
+        2 * self.people.len()
+    }
+}
+
+fn learned(sequence: &Sequence, body: &BodyModel) -> anyhow::Result<Learned> {
+    let subject = Subject::new(body, &sequence.betas)?;
+    let frames = 0..sequence.frames.len();
+    Ok(Learned {
+        frames: frames
+            .map(|frame| frame_of(sequence, frame, &subject))
+            .collect(),
+        subject,
+    })
+}
+
+/// A frame's whole surface.
+pub(super) fn frame_of(sequence: &Sequence, frame: usize, subject: &Subject) -> LearnedFrame {
+    LearnedFrame {
+        theta: sequence.frames[frame].theta,
+        points: points_of(&sequence.star_mesh(frame), subject, frame as u64),
+    }
+}
+
+fn points_of(star: &TriangleMesh, subject: &Subject, seed: u64) -> Vec<(Vec3, Vec3)> {
+    sample_surface(star, POINTS_PER_FRAME, seed)
+        .iter()
+        .map(|sample| {
+            (
+                subject.unit_box.unit_from_canonical(sample.point),
+                sample.normal,
+            )
+        })
+        .collect()
+}
+
+impl PersonSource for ClothPeople {
+    fn person(&self, number: u64, frames: usize) -> Person {
+        let drawn = number / 2;
+        let (who, round) = (drawn % self.count() as u64, drawn / self.count() as u64);
+        let person = &self.people[who as usize / 2];
+        let is_mirrored = who % 2 == 1;
+        let all = person.frames.len();
+        // A few frames start somewhere else each time; all frames are all there are.
+        let start = if frames < all {
+            (round.wrapping_mul(7919) % all as u64) as usize
+        } else {
+            0
+        };
+        let stride = (all / frames.max(1)).max(1);
+        let frame = |index: usize| {
+            let frame = &person.frames[(start + index * stride) % all];
+            if is_mirrored {
+                mirrored(frame, &person.subject)
+            } else {
+                as_is(frame, &person.subject)
+            }
+        };
+        Person { frames: (0..frames.min(all)).map(frame).collect() }
+    }
+}
+
+pub(super) fn as_is(frame: &LearnedFrame, subject: &Subject) -> PersonFrame {
+    PersonFrame {
+        pose: subject.pose_input(&frame.theta),
+        points_in_unit: frame.points.iter().map(|(point, _)| *point).collect(),
+        normals: frame.points.iter().map(|(_, normal)| *normal).collect(),
+    }
+}
+
+/// Left is right and right is left; the body model is the same on both sides.
+fn mirrored(frame: &LearnedFrame, subject: &Subject) -> PersonFrame {
+    let unit_box = &subject.unit_box;
+    let across = |v: Vec3| Vec3::new(-v.x, v.y, v.z);
+    let theta = std::array::from_fn(|joint| {
+        // A rotation's axis is a pseudovector.
+        let axis = frame.theta[MIRROR_JOINT[joint]];
+        Vec3::new(axis.x, -axis.y, -axis.z)
+    });
+    PersonFrame {
+        pose: subject.pose_input(&theta),
+        points_in_unit: frame
+            .points
+            .iter()
+            .map(|(point, _)| {
+                unit_box.unit_from_canonical(across(unit_box.canonical_from_unit(*point)))
+            })
+            .collect(),
+        normals: frame
+            .points
+            .iter()
+            .map(|(_, normal)| across(*normal))
+            .collect(),
+    }
+}
+
+/// People in clothes that are offsets of their skin, made when they are asked for.
+pub(super) struct OffsetPeople {
+    pub(super) body: Arc<BodyModel>,
+    pub(super) seed: u64,
+}
+
+impl PersonSource for OffsetPeople {
+    fn person(&self, number: u64, frames: usize) -> Person {
+        let simulated =
+            population::person(Arc::clone(&self.body), self.seed, number as usize, frames);
+        let subject = Subject::new(&self.body, &simulated.person.betas)
+            .expect("the built-in body has vertices in every shape");
+        let frame = |(index, sample): (usize, &population::PopulationSample)| {
+            let seed = number * 1000 + index as u64;
+            let points = points_of(&sample.clothed_canonical, &subject, seed);
+            as_is(&LearnedFrame { theta: sample.theta, points }, &subject)
+        };
+        Person { frames: simulated.samples.iter().enumerate().map(frame).collect() }
+    }
+}
+
+/// Everybody that a prior is learned from.
+pub(super) struct People {
+    pub(super) cloth: Option<ClothPeople>,
+    pub(super) offsets: OffsetPeople,
+    /// Of this many people in a row one is an [`OffsetPeople`]'s; 0 for none.
+    pub(super) one_in: u64,
+    /// In words.
+    pub(super) described: String,
+}
+
+impl PersonSource for People {
+    fn person(&self, number: u64, frames: usize) -> Person {
+        let drawn = number / 2;
+        match &self.cloth {
+            Some(cloth) if self.one_in == 0 => cloth.person(number, frames),
+            Some(cloth) if !drawn.is_multiple_of(self.one_in) => {
+                cloth.person(2 * (drawn - drawn / self.one_in - 1), frames)
+            }
+            _ => self.offsets.person(number, frames),
+        }
+    }
+}
