@@ -410,3 +410,53 @@ fn a_recording_cut_off_plays_up_to_the_cut_and_says_what_is_missing() {
         "{frames} frames of 60 before the cut"
     );
 }
+
+/// A training of a few seconds: tiny networks, a handful of steps.
+const TINY_TRAINING: &str = r#"
+[network]
+heads = { low_rank = 4 }
+[network.field]
+hidden = 16
+layers = 3
+[reptile]
+warm_up_steps = 3
+outer_steps = 1
+people = 2
+inner_steps = 2
+[joint]
+people = 2
+frames = 2
+steps = 3
+people_per_step = 2
+frames_per_person = 1
+[adapt]
+outer_steps = 1
+frames = 2
+inner_steps = 2
+"#;
+
+#[test]
+fn training_gives_the_same_network_twice_and_says_what_it_needs() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    fs::write(here.join("tiny.toml"), TINY_TRAINING).unwrap();
+    for name in ["a", "b"] {
+        let (field, prior) = (format!("{name}-sdf.st"), format!("{name}.st"));
+        let tiny = ["--config", "tiny.toml"];
+        let first = ["train", "sdf", "--out", &field];
+        assert_succeeds(&effigy(here, &[&first[..], &tiny].concat()));
+        let second = ["train", "hyper", "--start", &field, "--out", &prior];
+        assert_succeeds(&effigy(here, &[&second[..], &tiny].concat()));
+    }
+    let bytes = |name: &str| fs::read(here.join(name)).unwrap();
+    assert!(bytes("a.st") == bytes("b.st"));
+    assert!(here.join("a.joint.svg").exists() && here.join("a.curve.csv").exists());
+
+    // A field of another size, no field at all, and a checkpoint that somebody may still want.
+    let with_start = |start| effigy(here, &["train", "hyper", "--start", start, "--out", "c.st"]);
+    assert_fails(&with_start("a-sdf.st"), 1, &["a-sdf.st", "--preset"]);
+    assert_fails(&with_start("none.st"), 1, &["none.st", "effigy train sdf"]);
+    fs::write(here.join("d.checkpoint"), "kept").unwrap();
+    let again = effigy(here, &["train", "sdf", "--out", "d.st"]);
+    assert_fails(&again, 1, &["d.checkpoint", "--resume"]);
+}
