@@ -18,8 +18,11 @@ use effigy_sim_sensor::{
 use glam::Vec3;
 use rayon::prelude::*;
 
-/// Points kept of each simulated surface.
-const POINTS_PER_FRAME: usize = 2500;
+/// Points kept of each surface in cloth; all of them stay in memory.
+const CLOTH_POINTS: usize = 2500;
+
+/// Points of a surface that is made when it is asked for.
+const OFFSET_POINTS: usize = 4000;
 
 /// A person's surfaces, and who they are in numbers.
 struct Learned {
@@ -72,12 +75,20 @@ fn learned(sequence: &Sequence, body: &BodyModel) -> anyhow::Result<Learned> {
 pub(super) fn frame_of(sequence: &Sequence, frame: usize, subject: &Subject) -> LearnedFrame {
     LearnedFrame {
         theta: sequence.frames[frame].theta,
-        points: points_of(&sequence.star_mesh(frame), subject, frame as u64),
+        points: points_of(
+            &sequence.star_mesh(frame),
+            subject,
+            (CLOTH_POINTS, frame as u64),
+        ),
     }
 }
 
-fn points_of(star: &TriangleMesh, subject: &Subject, seed: u64) -> Vec<(Vec3, Vec3)> {
-    sample_surface(star, POINTS_PER_FRAME, seed)
+fn points_of(
+    star: &TriangleMesh,
+    subject: &Subject,
+    (count, seed): (usize, u64),
+) -> Vec<(Vec3, Vec3)> {
+    sample_surface(star, count, seed)
         .iter()
         .map(|sample| {
             (
@@ -162,7 +173,7 @@ impl PersonSource for OffsetPeople {
             .expect("the built-in body has vertices in every shape");
         let frame = |(index, sample): (usize, &population::PopulationSample)| {
             let seed = number * 1000 + index as u64;
-            let points = points_of(&sample.clothed_canonical, &subject, seed);
+            let points = points_of(&sample.clothed_canonical, &subject, (OFFSET_POINTS, seed));
             as_is(&LearnedFrame { theta: sample.theta, points }, &subject)
         };
         Person { frames: simulated.samples.iter().enumerate().map(frame).collect() }
