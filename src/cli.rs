@@ -244,6 +244,11 @@ pub(crate) enum DatasetWhat {
     /// Make a data set; a second run goes on where the first was interrupted
     #[command(after_help = "Example: effigy dataset make --preset prior --seed 1 --out data/prior")]
     Make(DatasetMakeArgs),
+    /// Make a data set of real CAPE, for those who have its licence; a second run goes on
+    #[command(
+        after_help = "Example: effigy dataset import-cape cape_release --body smpl_female.npz --gender female --out data/cape-female"
+    )]
+    ImportCape(ImportCapeArgs),
     /// Draw a contact sheet of a data set
     #[command(after_help = "Example: effigy dataset view data/prior --out prior.png")]
     View(DatasetViewArgs),
@@ -263,9 +268,36 @@ pub(crate) struct DatasetMakeArgs {
 }
 
 #[derive(Debug, Args)]
+pub(crate) struct ImportCapeArgs {
+    /// The unpacked release: the folder with `sequences` and `minimal_body_shape`
+    pub(crate) release: PathBuf,
+    /// SMPL's body of the people that are taken (.npz)
+    #[arg(long)]
+    pub(crate) body: PathBuf,
+    /// Only people of one gender, for whom the body was made
+    #[arg(long)]
+    pub(crate) gender: Option<CapeGender>,
+    /// One frame in so many
+    #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..))]
+    pub(crate) every: u32,
+    /// The folder to fill
+    #[arg(long)]
+    pub(crate) out: PathBuf,
+}
+
+#[derive(Clone, Copy, Debug, clap::ValueEnum)]
+pub(crate) enum CapeGender {
+    Female,
+    Male,
+}
+
+#[derive(Debug, Args)]
 pub(crate) struct DatasetViewArgs {
-    /// The folder that `dataset make` filled
+    /// The folder that `dataset make` or `dataset import-cape` filled
     pub(crate) dataset: PathBuf,
+    /// The body model its people were made on, if it was not the built-in one
+    #[arg(long)]
+    pub(crate) body: Option<PathBuf>,
     /// The picture to write
     #[arg(long)]
     pub(crate) out: PathBuf,

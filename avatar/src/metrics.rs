@@ -4,7 +4,7 @@ use effigy_fusion::{
     FusionError, TriangleMesh,
     mesh::{closest_point::ClosestPoint, normals::vertex_normals, sample::sample_surface},
 };
-use effigy_registration::smpl::{JOINT_COUNT, VertexWeights};
+use effigy_registration::smpl::{JOINT_COUNT, MEASURED_JOINTS, VertexWeights};
 use glam::Vec3;
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use serde::{Deserialize, Serialize};
@@ -20,9 +20,6 @@ pub struct SurfaceMetrics {
     pub nc: f32,
 }
 
-/// Bones whose vertices count: the body without ankles, feet, neck, head, wrists and hands.
-const MEASURED_BONES: [u8; 14] = [0, 1, 2, 3, 4, 5, 6, 9, 13, 14, 16, 17, 18, 19];
-
 /// Which vertices of a surface count: those that its triangles use and whose largest weight is a measured bone's.
 pub fn measured_vertices(weights: &[VertexWeights], triangles: &[[u32; 3]]) -> Vec<bool> {
     let mut used = vec![false; weights.len()];
@@ -31,7 +28,7 @@ pub fn measured_vertices(weights: &[VertexWeights], triangles: &[[u32; 3]]) -> V
     }
     let on_measured_bone = weights
         .iter()
-        .map(|weights| MEASURED_BONES.contains(&weights.main_bone()));
+        .map(|weights| MEASURED_JOINTS.contains(&weights.main_bone()));
     on_measured_bone
         .zip(used)
         .map(|(on, used)| on && used)

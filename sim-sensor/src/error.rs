@@ -12,6 +12,9 @@ pub enum SimError {
     Json { expected_version: u32, source: serde_json::Error },
     #[error("{path}: {problem}")]
     Dataset { path: PathBuf, problem: String },
+    /// A sequence in memory, wherever it was read from.
+    #[error("sequence {name}: {problem}")]
+    Sequence { name: String, problem: String },
     #[error("{path}: {source}")]
     CharacterIo { path: PathBuf, source: std::io::Error },
     /// A glTF file that holds no character we can move.

@@ -1,13 +1,19 @@
 //! What is simulated: plain data that a recording carries with it.
 
-use std::path::PathBuf;
+use std::{path::PathBuf, sync::Arc};
 
 use effigy_capture::{Calibration, FrameId, Timestamp};
-use effigy_registration::motion::{self, Motion, RestBody, Routine};
+use effigy_registration::{
+    BodyModel,
+    motion::{self, Motion, RestBody, Routine},
+};
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    error::SimError, person::OutfitKind, preset::SensorPreset, random::Randomness,
+    error::SimError,
+    person::{Material, Outfit, OutfitKind, Person, sample_betas},
+    preset::SensorPreset,
+    random::Randomness,
     stranger::StrangerChoice,
 };
 
@@ -185,6 +191,32 @@ impl Scenario {
         // The first frame always comes: a stream that starts with a gap helps nobody.
         let random = Randomness::new(self.seed, 0, 0xd0);
         frame.0 > 0 && random.uniform(frame.0) < self.dropped_share
+    }
+
+    /// Who it is, in clothes that are part of their surface.
+    pub(crate) fn person(&self, body: Arc<BodyModel>, outfit: Outfit) -> Person {
+        match self.likeness {
+            Likeness::Individual => Person::individual(body, outfit, self.seed),
+            Likeness::Model => {
+                let sampled = || sample_betas(&body, self.seed);
+                let betas = self.betas.unwrap_or_else(sampled);
+                Person::new(body, betas, outfit, self.seed)
+            }
+        }
+    }
+
+    /// How loosely simulated clothes are cut: 0 (tight) to 1.
+    pub(crate) fn cloth_fit(&self) -> f32 {
+        let random = Randomness::new(self.seed, 0, 0xf17);
+        self.fit.unwrap_or_else(|| random.uniform(0))
+    }
+
+    /// What simulated garments are made of, from the innermost to the outermost; none without simulated clothes.
+    pub(crate) fn cloth_materials(&self) -> Vec<Material> {
+        let kind = self.outfit.cloth();
+        let patterns = kind.map(|kind| kind.patterns(self.cloth_fit(), self.seed));
+        let patterns = patterns.unwrap_or_default();
+        patterns.iter().map(|pattern| pattern.material).collect()
     }
 
     /// The movement as a body performs it.

@@ -13,9 +13,8 @@ use effigy_registration::{
 use crate::{
     cloth::{ClothConfig, ClothedSurface, Tape, Wear},
     error::SimError,
-    person::{Outfit, Person, sample_betas},
-    random::Randomness,
-    scenario::{Likeness, Scenario},
+    person::{Outfit, Person},
+    scenario::Scenario,
 };
 
 /// What sensor and truth share.
@@ -40,14 +39,7 @@ impl Scene {
             });
         }
         let outfit = Outfit::new(scenario.outfit, scenario.seed);
-        let mut person = match scenario.likeness {
-            Likeness::Individual => Person::individual(body, outfit, scenario.seed),
-            Likeness::Model => {
-                let sampled = || sample_betas(&body, scenario.seed);
-                let betas = scenario.betas.unwrap_or_else(sampled);
-                Person::new(body, betas, outfit, scenario.seed)
-            }
-        };
+        let mut person = scenario.person(body, outfit);
         let cloth = worn(&scenario, &mut person);
         let motion = scenario.motion(&person.rest_body())?;
         let world_from_camera = scenario.calibration().world_from_camera.unwrap_or_default();
@@ -66,6 +58,18 @@ impl Scene {
         self.motion
             .at(secs)
             .expect("routines and clips have at least one pose")
+    }
+
+    /// Between two frames the way of the shorter arcs.
+    pub(crate) fn pose_between(&self, frames: f64) -> MotionPose {
+        let before = frames.max(0.0).floor();
+        let [from, to] = [before as u64, before as u64 + 1].map(|frame| self.pose(FrameId(frame)));
+        from.interpolate(&to, (frames - before) as f32)
+    }
+
+    /// The clothes as they lie in a frame, to be moved on from there; `None` without simulated clothes.
+    pub(crate) fn wear_after(&self, frame: FrameId) -> Option<Wear> {
+        self.worn_at(frame, Wear::clone)
     }
 
     /// The person in simulated clothes in a frame; `None` for clothes that are part of the person's surface.
@@ -99,8 +103,7 @@ impl Scene {
 /// Cuts the simulated clothes a scenario asks for; the person's paint learns their colours.
 fn worn(scenario: &Scenario, person: &mut Person) -> Option<Arc<Mutex<Tape>>> {
     let kind = scenario.outfit.cloth()?;
-    let random = Randomness::new(scenario.seed, 0, 0xf17);
-    let fit = scenario.fit.unwrap_or_else(|| random.uniform(0));
+    let fit = scenario.cloth_fit();
     let under = Arc::new(person.clone());
     let wear = Wear::new(under, kind, fit, scenario.seed, ClothConfig::default());
     let garments = wear.garments().iter();

@@ -68,6 +68,10 @@ impl Truth {
         &self.scene.person
     }
 
+    pub(crate) fn scene(&self) -> &Scene {
+        &self.scene
+    }
+
     /// Only the parameters: cheap.
     pub fn params(&self, frame: FrameId) -> BodyParams {
         let pose = self.scene.pose(frame);

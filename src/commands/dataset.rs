@@ -1,16 +1,18 @@
 //! `effigy dataset`: simulated people to learn from and to measure with, made and looked at.
 
-use std::{collections::BTreeMap, path::Path};
+use std::{collections::BTreeMap, path::Path, sync::Arc};
 
+use anyhow::bail;
 use effigy_fusion::TriangleMesh;
-use effigy_registration::smpl::builtin;
+use effigy_registration::{BodyModel, smpl::builtin};
 use effigy_sim_sensor::dataset::{
-    Dataset, DatasetPlan, MakeProgress, Manifest, Sequence, SequenceEntry, Split, make,
+    CapeImport, Dataset, DatasetPlan, DatasetPreset, Gender, MakeProgress, Manifest, Sequence,
+    SequenceEntry, Split, import_cape, make,
 };
 use effigy_viewer::pictures::{Clay, ContactSheet, MeshView, PictureCamera, render_mesh};
 
 use crate::{
-    cli::{DatasetArgs, DatasetMakeArgs, DatasetViewArgs, DatasetWhat},
+    cli::{CapeGender, DatasetArgs, DatasetMakeArgs, DatasetViewArgs, DatasetWhat, ImportCapeArgs},
     interrupt,
     progress::Progress,
 };
@@ -22,11 +24,17 @@ const TILE_PX: [u32; 2] = [260, 360];
 pub(crate) fn run(args: &DatasetArgs) -> anyhow::Result<()> {
     match &args.what {
         DatasetWhat::Make(args) => make_dataset(args),
+        DatasetWhat::ImportCape(args) => import(args),
         DatasetWhat::View(args) => view(args),
     }
 }
 
 fn make_dataset(args: &DatasetMakeArgs) -> anyhow::Result<()> {
+    if args.preset == DatasetPreset::Cape {
+        bail!(
+            "CAPE itself is not made but imported: `effigy dataset import-cape`; `cape-like` is ours"
+        );
+    }
     let plan = DatasetPlan::new(args.preset, args.seed);
     let progress = Progress::new("simulating", Some(plan.frame_count()));
     let go_on = |now: MakeProgress| {
@@ -36,6 +44,30 @@ fn make_dataset(args: &DatasetMakeArgs) -> anyhow::Result<()> {
     let made = make(&plan, &builtin::body(), &args.out, &go_on)?;
     progress.finish();
     let Some(manifest) = made else {
+        println!("stopped; the same command goes on from here");
+        return Ok(());
+    };
+    println!("{}", summary(&args.out, &manifest));
+    Ok(())
+}
+
+fn import(args: &ImportCapeArgs) -> anyhow::Result<()> {
+    let body = Arc::new(BodyModel::load(&args.body)?);
+    let choice = CapeImport {
+        every: args.every as usize,
+        gender: args.gender.map(|gender| match gender {
+            CapeGender::Female => Gender::Female,
+            CapeGender::Male => Gender::Male,
+        }),
+    };
+    let progress = Progress::new("importing", None);
+    let go_on = |now: MakeProgress| {
+        progress.advance(now.frames);
+        !interrupt::requested()
+    };
+    let imported = import_cape(&args.release, &body, &choice, &args.out, &go_on)?;
+    progress.finish();
+    let Some(manifest) = imported else {
         println!("stopped; the same command goes on from here");
         return Ok(());
     };
@@ -67,7 +99,11 @@ fn summary(folder: &Path, manifest: &Manifest) -> String {
 
 /// A row a sequence; of each outfit at most `--rows`.
 fn view(args: &DatasetViewArgs) -> anyhow::Result<()> {
-    let dataset = Dataset::open(&args.dataset, &builtin::body())?;
+    let body = match &args.body {
+        Some(path) => Arc::new(BodyModel::load(path)?),
+        None => builtin::body(),
+    };
+    let dataset = Dataset::open(&args.dataset, &body)?;
     println!("{}", summary(&args.dataset, dataset.manifest()));
     let mut shown: BTreeMap<&str, usize> = BTreeMap::new();
     let mut sheet = ContactSheet::new(MOMENTS + 1);
@@ -92,7 +128,7 @@ fn add_row(mut sheet: ContactSheet, entry: &SequenceEntry, sequence: &Sequence) 
         let label = if moment == 0 {
             format!(
                 "{} {}, {}",
-                split_name(plan.split),
+                plan.split.name(),
                 plan.subject,
                 plan.outfit.name()
             )
@@ -102,13 +138,6 @@ fn add_row(mut sheet: ContactSheet, entry: &SequenceEntry, sequence: &Sequence) 
         sheet = sheet.add(label, drawn(&sequence.posed_mesh(frame)));
     }
     sheet.add("star pose", drawn(&sequence.star_mesh(last)))
-}
-
-fn split_name(split: Split) -> &'static str {
-    match split {
-        Split::Train => "train",
-        Split::Test => "test",
-    }
 }
 
 fn drawn(mesh: &TriangleMesh) -> effigy_viewer::pictures::Picture {

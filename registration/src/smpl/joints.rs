@@ -7,6 +7,9 @@ pub const PARENTS: [usize; JOINT_COUNT] = [
     0, 0, 0, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 9, 9, 12, 13, 14, 16, 17, 18, 19, 20, 21,
 ];
 
+/// Whose vertices MetaAvatar measures: the body without ankles, feet, neck, head, wrists and hands.
+pub const MEASURED_JOINTS: [u8; 14] = [0, 1, 2, 3, 4, 5, 6, 9, 13, 14, 16, 17, 18, 19];
+
 #[rustfmt::skip]
 pub const JOINT_NAMES: [&str; JOINT_COUNT] = [
     "pelvis", "left_hip", "right_hip", "spine1", "left_knee", "right_knee", "spine2", "left_ankle",

@@ -11,7 +11,7 @@ mod lbs;
 mod load;
 pub mod mirror;
 mod model;
-pub(crate) mod npz;
+pub mod npz;
 mod params;
 mod parts;
 mod poser;
@@ -20,7 +20,7 @@ mod star_pose;
 mod unit_box;
 
 pub use jacobian::{PARAMETER_COUNT, PoseJacobian};
-pub use joints::{JOINT_COUNT, JOINT_NAMES, PARENTS};
+pub use joints::{JOINT_COUNT, JOINT_NAMES, MEASURED_JOINTS, PARENTS};
 pub use lbs::{BoneTransforms, PosedBody};
 pub use model::{BodyIdentity, BodyModel, PoseDirection, SparseRow, VertexWeights};
 pub use params::BodyParams;

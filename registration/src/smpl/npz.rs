@@ -17,19 +17,19 @@ const LARGEST_ARRAY_BYTES: u64 = 128 << 20;
 const LARGEST_HEADER_BYTES: usize = 64 << 10;
 
 /// An open archive.
-pub(crate) struct Npz {
+pub struct Npz {
     path: PathBuf,
     archive: ZipArchive<BufReader<File>>,
 }
 
 /// A real array in row-major order.
-pub(crate) struct Array {
-    pub(crate) shape: Vec<usize>,
-    pub(crate) data: Vec<f64>,
+pub struct Array {
+    pub shape: Vec<usize>,
+    pub data: Vec<f64>,
 }
 
 impl Npz {
-    pub(crate) fn open(path: &Path) -> Result<Self, RegistrationError> {
+    pub fn open(path: &Path) -> Result<Self, RegistrationError> {
         let file = File::open(path)
             .map_err(|source| RegistrationError::Io { path: path.to_owned(), source })?;
         let archive = ZipArchive::new(BufReader::new(file)).map_err(|error| {
@@ -38,12 +38,12 @@ impl Npz {
         Ok(Self { path: path.to_owned(), archive })
     }
 
-    pub(crate) fn has(&self, array: &str) -> bool {
+    pub fn has(&self, array: &str) -> bool {
         self.archive.index_for_name(&file_name(array)).is_some()
     }
 
     /// The array of this name; every number is finite.
-    pub(crate) fn array(&mut self, array: &'static str) -> Result<Array, RegistrationError> {
+    pub fn array(&mut self, array: &'static str) -> Result<Array, RegistrationError> {
         let bytes = self.bytes(array)?;
         let parsed =
             parse(&bytes).map_err(|found| self.wrong(array, "an array of numbers", found))?;
@@ -55,7 +55,7 @@ impl Npz {
     }
 
     /// As [`Self::array`], of a shape in which `None` stands for any length.
-    pub(crate) fn shaped(
+    pub fn shaped(
         &mut self,
         array: &'static str,
         shape: &[Option<usize>],
@@ -78,12 +78,7 @@ impl Npz {
         Err(self.wrong(array, &expected, format!("shape {:?}", parsed.shape)))
     }
 
-    pub(crate) fn wrong(
-        &self,
-        array: &'static str,
-        expected: &str,
-        found: String,
-    ) -> RegistrationError {
+    pub fn wrong(&self, array: &'static str, expected: &str, found: String) -> RegistrationError {
         let (path, expected) = (self.path.clone(), expected.to_owned());
         RegistrationError::BodyArray { path, array, expected, found }
     }
@@ -121,6 +116,25 @@ impl Npz {
             return Err(self.wrong(array, "an array of a body's size", found));
         }
         Ok(bytes)
+    }
+}
+
+/// The one array of an `.npy` file, under a name for errors; every number is finite.
+pub fn read_npy(path: &Path, name: &'static str) -> Result<Array, RegistrationError> {
+    let io = |source| RegistrationError::Io { path: path.to_owned(), source };
+    let file = File::open(path).map_err(io)?;
+    let mut bytes = Vec::new();
+    file.take(LARGEST_ARRAY_BYTES)
+        .read_to_end(&mut bytes)
+        .map_err(io)?;
+    let wrong = |expected: &str, found: String| {
+        let (path, expected) = (path.to_owned(), expected.to_owned());
+        RegistrationError::BodyArray { path, array: name, expected, found }
+    };
+    let parsed = parse(&bytes).map_err(|found| wrong("an array of numbers", found))?;
+    match parsed.data.iter().find(|value| !value.is_finite()) {
+        Some(value) => Err(wrong("finite numbers", value.to_string())),
+        None => Ok(parsed),
     }
 }
 

@@ -9,12 +9,12 @@ use std::{
     },
 };
 
-use effigy_registration::BodyModel;
+use effigy_registration::{BodyModel, smpl::BodyIdentity};
 use rayon::prelude::*;
 
 use super::{
-    archive::{pack, unpack},
-    manifest::{DATASET_SCHEMA, MANIFEST, Manifest, SequenceEntry, sha256},
+    manifest::{DATASET_SCHEMA, MANIFEST, Manifest, SequenceEntry, read_bounded, sha256},
+    packing::{body_of, pack, unpack},
     plan::{DatasetPlan, SequencePlan},
     sequence::Sequence,
 };
@@ -37,6 +37,37 @@ pub fn make(
     folder: &Path,
     go_on: &(dyn Fn(MakeProgress) -> bool + Sync),
 ) -> Result<Option<Manifest>, SimError> {
+    let simulate = |sequence: &SequencePlan, next: &mut dyn FnMut() -> bool| {
+        let scenario = sequence.scenario.as_ref();
+        let scenario = scenario.ok_or_else(|| SimError::Sequence {
+            name: sequence.name.clone(),
+            problem: "it has no scenario to simulate".to_owned(),
+        })?;
+        let truth = Truth::new(scenario, Arc::clone(body))?;
+        Ok(Sequence::simulate(sequence, &truth, next))
+    };
+    make_all(
+        &Work { plan, body: body.identity, folder, go_on },
+        &simulate,
+    )
+}
+
+/// What is to be made, and where.
+pub(super) struct Work<'a> {
+    pub(super) plan: &'a DatasetPlan,
+    pub(super) body: BodyIdentity,
+    pub(super) folder: &'a Path,
+    pub(super) go_on: &'a (dyn Fn(MakeProgress) -> bool + Sync),
+}
+
+/// Makes one sequence; `None` if the function said no that is called before each frame.
+pub(super) type MakeOne<'a> = dyn Fn(&SequencePlan, &mut dyn FnMut() -> bool) -> Result<Option<Sequence>, SimError>
+    + Sync
+    + 'a;
+
+/// Makes what is missing, in parallel, and writes the manifest when all is there.
+pub(super) fn make_all(work: &Work<'_>, one: &MakeOne<'_>) -> Result<Option<Manifest>, SimError> {
+    let Work { plan, body, folder, go_on } = *work;
     fs::create_dir_all(folder).map_err(io(folder))?;
     let (done, found) = (AtomicU64::new(0), AtomicU64::new(0));
     let progress = || MakeProgress {
@@ -44,42 +75,37 @@ pub fn make(
         frames_in_all: plan.frame_count(),
         frames_found: found.load(Ordering::Relaxed),
     };
-    let one = |sequence: &SequencePlan| -> Result<Option<SequenceEntry>, SimError> {
+    let finished = |sequence: &SequencePlan| -> Result<Option<SequenceEntry>, SimError> {
         let file = format!("{}.npz", sequence.name);
         let path = folder.join(&file);
         let frames = u64::from(sequence.frames);
-        if let Some(bytes) = made_before(&path, sequence) {
+        if let Some((found_before, bytes)) = made_before(&path, sequence, body) {
             found.fetch_add(frames, Ordering::Relaxed);
             done.fetch_add(frames, Ordering::Relaxed);
             go_on(progress());
-            return Ok(Some(entry(file, sequence, &bytes)));
+            return Ok(Some(entry(file, &found_before, &bytes)));
         }
-        let truth = Truth::new(&sequence.scenario, Arc::clone(body))?;
-        let made = Sequence::simulate(sequence, &truth, || {
+        let made = one(sequence, &mut || {
             done.fetch_add(1, Ordering::Relaxed);
             go_on(progress())
-        });
+        })?;
         let Some(made) = made else {
             return Ok(None);
         };
-        let bytes = pack(&made, plan.offset_step_m)
+        let bytes = pack(&made, body, plan.offset_step_m)
             .map_err(|problem| SimError::Dataset { path: path.clone(), problem })?;
         write_whole(&path, &bytes)?;
-        Ok(Some(entry(file, sequence, &bytes)))
+        Ok(Some(entry(file, &made, &bytes)))
     };
-    let entries: Option<Vec<SequenceEntry>> = plan
-        .sequences
-        .par_iter()
-        .map(one)
-        .collect::<Result<_, _>>()?;
-    let Some(sequences) = entries else {
+    let sequences = plan.sequences.par_iter().map(finished);
+    let Some(sequences) = sequences.collect::<Result<Option<Vec<_>>, _>>()? else {
         return Ok(None);
     };
     let manifest = Manifest {
         schema: DATASET_SCHEMA.to_owned(),
         preset: plan.preset,
         seed: plan.seed,
-        body: body.identity,
+        body,
         frames: plan.frame_count(),
         bytes: sequences.iter().map(|entry| entry.bytes).sum(),
         sequences,
@@ -89,15 +115,25 @@ pub fn make(
     Ok(Some(manifest))
 }
 
-/// The bytes of a file that an earlier run made from the same plan.
-fn made_before(path: &Path, plan: &SequencePlan) -> Option<Vec<u8>> {
-    let bytes = fs::read(path).ok()?;
+/// What an earlier run made from the same plan, with the same body and in today's schema, and its bytes.
+fn made_before(
+    path: &Path,
+    plan: &SequencePlan,
+    body: BodyIdentity,
+) -> Option<(Sequence, Vec<u8>)> {
+    let bytes = read_bounded(path).ok()?;
     let sequence = unpack(&bytes).ok()?;
-    (sequence.plan == *plan).then_some(bytes)
+    (sequence.plan == *plan && body_of(&bytes) == Some(body)).then_some((sequence, bytes))
 }
 
-fn entry(file: String, plan: &SequencePlan, bytes: &[u8]) -> SequenceEntry {
-    SequenceEntry { file, bytes: bytes.len() as u64, sha256: sha256(bytes), plan: plan.clone() }
+fn entry(file: String, sequence: &Sequence, bytes: &[u8]) -> SequenceEntry {
+    SequenceEntry {
+        file,
+        bytes: bytes.len() as u64,
+        sha256: sha256(bytes),
+        plan: sequence.plan.clone(),
+        cloth: sequence.cloth,
+    }
 }
 
 /// Under its name there is never half a file.

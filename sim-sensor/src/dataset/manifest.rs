@@ -1,7 +1,9 @@
 //! The list of a data set's files, with their checksums; opening and reading them.
 
 use std::{
+    ffi::OsStr,
     fs,
+    io::Read as _,
     path::{Path, PathBuf},
 };
 
@@ -10,14 +12,22 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};
 
 use super::{
-    archive::unpack,
-    plan::{DatasetPreset, SequencePlan},
+    history::ClothFacts,
+    outfit_name::OutfitName,
+    packing::unpack,
+    plan::{DatasetPreset, SequencePlan, Split},
     sequence::Sequence,
 };
 use crate::error::SimError;
 
-/// Changes when files of old would be misread.
-pub const DATASET_SCHEMA: &str = "effigy.dataset/1";
+/// Changes when programs of old would misread files.
+pub const DATASET_SCHEMA: &str = "effigy.dataset/2";
+
+/// Written by earlier programs, without history floors; readable.
+const EARLIER_SCHEMA: &str = "effigy.dataset/1";
+
+/// The largest file of a real data set has a few MiB.
+const LARGEST_FILE_BYTES: u64 = 256 << 20;
 
 pub(super) const MANIFEST: &str = "manifest.json";
 
@@ -44,6 +54,24 @@ pub struct SequenceEntry {
     /// In hexadecimal.
     pub sha256: String,
     pub plan: SequencePlan,
+    /// Of simulated clothes.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub cloth: Option<ClothFacts>,
+}
+
+impl Manifest {
+    /// The least mean error (`D_f`) that a function of the pose can have on this person in this outfit: the mean over
+    /// their sequences. `None` where it was not measured or nothing is simulated.
+    pub fn history_floor_cm(&self, split: Split, subject: u32, outfit: OutfitName) -> Option<f32> {
+        let of_wearer = self.sequences.iter().filter(|entry| {
+            let plan = &entry.plan;
+            plan.split == split && plan.subject == subject && plan.outfit == outfit
+        });
+        let floors: Vec<f32> = of_wearer
+            .filter_map(|entry| entry.cloth?.history_floor_cm)
+            .collect();
+        (!floors.is_empty()).then(|| floors.iter().sum::<f32>() / floors.len() as f32)
+    }
 }
 
 /// An open data set; sequences are read one at a time.
@@ -58,14 +86,14 @@ impl Dataset {
     pub fn open(folder: &Path, body: &BodyModel) -> Result<Self, SimError> {
         let path = folder.join(MANIFEST);
         let wrong = |problem: String| SimError::Dataset { path: path.clone(), problem };
-        let text = fs::read_to_string(&path).map_err(|error| {
+        let text = read_bounded(&path).map_err(|problem| {
             wrong(format!(
-                "{error}; a data set is complete when it has this file: make it with `effigy dataset make`"
+                "{problem}; a data set is complete when it has this file: make it with `effigy dataset make`"
             ))
         })?;
         let manifest: Manifest =
-            serde_json::from_str(&text).map_err(|error| wrong(error.to_string()))?;
-        if manifest.schema != DATASET_SCHEMA {
+            serde_json::from_slice(&text).map_err(|error| wrong(error.to_string()))?;
+        if ![DATASET_SCHEMA, EARLIER_SCHEMA].contains(&manifest.schema.as_str()) {
             let found = &manifest.schema;
             return Err(wrong(format!(
                 "expected schema {DATASET_SCHEMA}, found {found}"
@@ -87,16 +115,18 @@ impl Dataset {
     pub fn load(&self, entry: &SequenceEntry) -> Result<Sequence, SimError> {
         let path = self.folder.join(&entry.file);
         let wrong = |problem: String| SimError::Dataset { path: path.clone(), problem };
-        let found = fs::metadata(&path)
-            .map_err(|error| wrong(error.to_string()))?
-            .len();
-        if found != entry.bytes {
-            let expected = entry.bytes;
+        if Path::new(&entry.file).file_name() != Some(OsStr::new(&entry.file)) {
+            return Err(wrong(
+                "expected the name of a file in the folder".to_owned(),
+            ));
+        }
+        let bytes = read_bounded(&path).map_err(&wrong)?;
+        let (found, expected) = (bytes.len() as u64, entry.bytes);
+        if found != expected {
             return Err(wrong(format!(
                 "expected {expected} bytes, found {found}; make it again"
             )));
         }
-        let bytes = fs::read(&path).map_err(|error| wrong(error.to_string()))?;
         if sha256(&bytes) != entry.sha256 {
             return Err(wrong(
                 "its checksum is not the manifest's; delete it and make it again".to_owned(),
@@ -104,6 +134,23 @@ impl Dataset {
         }
         unpack(&bytes).map_err(wrong)
     }
+}
+
+/// A file's bytes, unless it is larger than any of a data set can be.
+pub(super) fn read_bounded(path: &Path) -> Result<Vec<u8>, String> {
+    let read = || -> std::io::Result<Vec<u8>> {
+        let mut bytes = Vec::new();
+        let file = fs::File::open(path)?;
+        file.take(LARGEST_FILE_BYTES + 1).read_to_end(&mut bytes)?;
+        Ok(bytes)
+    };
+    let bytes = read().map_err(|error| error.to_string())?;
+    if bytes.len() as u64 > LARGEST_FILE_BYTES {
+        return Err(format!(
+            "expected at most {LARGEST_FILE_BYTES} bytes, found more"
+        ));
+    }
+    Ok(bytes)
 }
 
 pub(super) fn sha256(bytes: &[u8]) -> String {

@@ -3,6 +3,7 @@
 use effigy_registration::motion::Routine;
 use serde::{Deserialize, Serialize};
 
+use super::outfit_name::OutfitName;
 use crate::{
     person::OutfitKind,
     random::Randomness,
@@ -21,6 +22,8 @@ pub enum DatasetPreset {
     Dev,
     /// A miniature for tests.
     Small,
+    /// Real CAPE, which is imported, not made.
+    Cape,
 }
 
 /// Whether training may see a person.
@@ -29,6 +32,15 @@ pub enum DatasetPreset {
 pub enum Split {
     Train,
     Test,
+}
+
+impl Split {
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Train => "train",
+            Self::Test => "test",
+        }
+    }
 }
 
 /// What a test person's sequence is for.
@@ -50,10 +62,12 @@ pub struct SequencePlan {
     pub split: Split,
     pub role: Role,
     pub subject: u32,
-    pub outfit: OutfitKind,
+    /// An [`OutfitKind`], or what a foreign data set calls it.
+    pub outfit: OutfitName,
     pub action: String,
-    /// Who, wearing what, doing what; `rate_hz` is the rate of the kept frames.
-    pub scenario: Scenario,
+    /// Who, wearing what, doing what; `rate_hz` is the rate of the kept frames. Only of simulated people.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub scenario: Option<Scenario>,
     pub frames: u32,
 }
 
@@ -63,10 +77,16 @@ pub struct SequencePlan {
 pub struct DatasetPlan {
     pub preset: DatasetPreset,
     pub seed: u64,
-    /// Star-pose offsets are rounded to this.
+    /// Surfaces in star pose are rounded to this.
     pub offset_step_m: f32,
     pub sequences: Vec<SequencePlan>,
 }
+
+/// Finer than simulated cloth is true; half of it is the largest error of a coordinate.
+pub(super) const STEP_M: f32 = 0.25e-3;
+
+/// Kept frames a second: CAPE's 60 Hz, every fifth frame.
+pub(super) const KEPT_RATE_HZ: f32 = 12.0;
 
 /// Test people have seeds that no training person can have.
 const TEST_SEEDS: u64 = 1 << 40;
@@ -103,13 +123,14 @@ const EXTRAPOLATED_ACTIONS: [Routine; 3] =
 
 impl DatasetPlan {
     pub fn new(preset: DatasetPreset, seed: u64) -> Self {
-        let (offset_step_m, sequences) = match preset {
-            DatasetPreset::Prior => (1e-3, prior(seed)),
-            DatasetPreset::CapeLike => (0.25e-3, cape_like(seed)),
-            DatasetPreset::Dev => (0.25e-3, dev(seed)),
-            DatasetPreset::Small => (0.25e-3, small(seed)),
+        let sequences = match preset {
+            DatasetPreset::Prior => prior(seed),
+            DatasetPreset::CapeLike => cape_like(seed),
+            DatasetPreset::Dev => dev(seed),
+            DatasetPreset::Small => small(seed),
+            DatasetPreset::Cape => Vec::new(),
         };
-        Self { preset, seed, offset_step_m, sequences }
+        Self { preset, seed, offset_step_m: STEP_M, sequences }
     }
 
     pub fn frame_count(&self) -> u64 {
@@ -247,8 +268,6 @@ struct Wearer {
 }
 
 fn sequence(seed: u64, wearer: Wearer, action: Routine, role: Role, frames: u32) -> SequencePlan {
-    /// Kept frames a second: CAPE's 60 Hz, every fifth frame.
-    const RATE_HZ: f32 = 12.0;
     let Wearer { split, subject, outfit } = wearer;
     let first = match split {
         Split::Train => 0,
@@ -258,28 +277,24 @@ fn sequence(seed: u64, wearer: Wearer, action: Routine, role: Role, frames: u32)
         .wrapping_mul(1_000_003)
         .wrapping_add(first + u64::from(subject));
     let (outfit_name, action_name) = (outfit.name(), action.name());
-    let split_name = match split {
-        Split::Train => "train",
-        Split::Test => "test",
-    };
     SequencePlan {
-        name: format!("{split_name}-{subject:03}-{outfit_name}-{action_name}"),
+        name: format!("{}-{subject:03}-{outfit_name}-{action_name}", split.name()),
         split,
         role,
         subject,
-        outfit,
+        outfit: outfit.into(),
         action: action_name.to_owned(),
-        scenario: Scenario {
+        scenario: Some(Scenario {
             seed: who,
             // As real people: the body model does not fit them to the last millimetre.
             likeness: Likeness::Individual,
             motion: MotionChoice::Routine(action),
             outfit,
-            seconds: frames as f32 / RATE_HZ,
-            rate_hz: Some(RATE_HZ),
+            seconds: frames as f32 / KEPT_RATE_HZ,
+            rate_hz: Some(KEPT_RATE_HZ),
             noise: Noise::None,
             ..Scenario::default()
-        },
+        }),
         frames,
     }
 }

@@ -1,14 +1,17 @@
 //! A sequence in memory: surfaces in star pose, and what follows from them.
 
-use effigy_capture::{DepthImage, FrameId, Intrinsics, Rigid3};
-use effigy_fusion::mesh::{TriangleMesh, z_buffer::Rasterizer};
+use effigy_capture::FrameId;
+use effigy_fusion::mesh::TriangleMesh;
 use effigy_registration::{
     BodyParams,
     smpl::{BoneTransforms, JOINT_COUNT, VertexWeights, star_transforms},
 };
-use glam::{Quat, Vec3};
+use glam::Vec3;
 
-use super::plan::SequencePlan;
+use super::{
+    history::{ClothFacts, cloth_facts, history_floor_cm, revisited},
+    plan::{SequencePlan, Split},
+};
 use crate::truth::{GroundTruth, Truth};
 
 /// Everything known about one person in one outfit doing one thing.
@@ -22,8 +25,15 @@ pub struct Sequence {
     pub weights: Vec<VertexWeights>,
     /// 0 for the person, 1 for the innermost garment, and so on; one a vertex.
     pub layers: Vec<u8>,
+    /// The vertices' numbers among all of the person's and of the clothes', hidden ones included: the same point has
+    /// the same number in all sequences of a person in an outfit. The first are the body model's.
+    pub numbers: Vec<u32>,
     /// All that can be seen from outside in some frame.
     pub triangles: Vec<[u32; 3]>,
+    /// A scanned person's minimal body in zero pose; empty for simulated people: see [`Sequence::minimal_body`].
+    pub minimal: Vec<Vec3>,
+    /// What the clothes do; `None` where none are simulated.
+    pub cloth: Option<ClothFacts>,
     pub frames: Vec<SequenceFrame>,
 }
 
@@ -49,14 +59,28 @@ impl Sequence {
         truth: &Truth,
         mut go_on: impl FnMut() -> bool,
     ) -> Option<Self> {
+        let revisited = match plan.split {
+            Split::Train => Vec::new(),
+            Split::Test => revisited(plan.frames),
+        };
         let mut gathered = Gathered::default();
+        let mut visits = Vec::new();
         for frame in 0..u64::from(plan.frames) {
             if !go_on() {
                 return None;
             }
-            gathered.add(truth.at(FrameId(frame)));
+            let truth = truth.at(FrameId(frame));
+            if revisited.contains(&frame) {
+                visits.push((frame, truth.clothed_in_world.clone()));
+            }
+            gathered.add(truth);
         }
-        Some(gathered.finish(plan.clone(), truth))
+        visits.reverse();
+        let last = u64::from(plan.frames.saturating_sub(1));
+        let floor_cm = history_floor_cm(truth, &gathered.weights, &visits, last);
+        let mut sequence = gathered.finish(plan.clone(), truth);
+        sequence.cloth = cloth_facts(&sequence, floor_cm);
+        Some(sequence)
     }
 
     /// The body model that comes nearest to the person.
@@ -82,33 +106,6 @@ impl Sequence {
         self.outer(frame, posed.collect())
     }
 
-    /// MetaAvatar's view of a frame, without noise (seed paper, section 4.1): from `yaw_rad` to the side of where a
-    /// camera at [`protocol_camera`] stands. Depth in millimetres, and where the camera stands.
-    pub fn protocol_depth(&self, frame: usize, yaw_rad: f32) -> (DepthImage, Rigid3) {
-        let (camera, distance_m) = protocol_camera();
-        let pelvis = self.rest_joints[0] + self.frames[frame].trans;
-        let turn = Quat::from_rotation_y(yaw_rad);
-        let world_from_camera = Rigid3 {
-            rotation: turn * Quat::from_rotation_x(std::f32::consts::PI),
-            translation: pelvis + turn * Vec3::Z * distance_m,
-        };
-        let camera_from_world = world_from_camera.inverse();
-        let mesh = self.posed_mesh(frame);
-        let seen: Vec<Vec3> = mesh
-            .vertices
-            .iter()
-            .map(|&v| camera_from_world * v)
-            .collect();
-        let mut rasterizer = Rasterizer::new(camera);
-        let raster = rasterizer.draw(&seen, &mesh.triangles);
-        let depth = raster.depth.iter().map(|z| (z * 1e3).round() as u16);
-        let image = DepthImage::new(camera.width, camera.height, depth.collect());
-        (
-            image.expect("the raster has the camera's size"),
-            world_from_camera,
-        )
-    }
-
     /// Only what is visible; vertices keep their numbers.
     fn outer(&self, frame: usize, vertices: Vec<Vec3>) -> TriangleMesh {
         let visible = &self.frames[frame].visible;
@@ -118,13 +115,6 @@ impl Sequence {
         mesh.compute_normals();
         mesh
     }
-}
-
-/// MetaAvatar's camera and its distance from the body in metres: 250 x 250 pixels, f = 250 px.
-pub fn protocol_camera() -> (Intrinsics, f32) {
-    let intrinsics =
-        Intrinsics { width: 250, height: 250, fx: 250.0, fy: 250.0, cx: 125.0, cy: 125.0 };
-    (intrinsics, 3.0)
 }
 
 /// Frames as they come, with all vertices, before the hidden ones are left out.
@@ -204,6 +194,9 @@ impl Gathered {
                 .iter()
                 .map(|t| t.map(|v| number[v as usize]))
                 .collect(),
+            numbers: kept.iter().map(|&v| v as u32).collect(),
+            minimal: Vec::new(),
+            cloth: None,
             plan,
         }
     }

@@ -69,7 +69,7 @@ fn plainness(place: &super::chart::Place) -> f32 {
 }
 
 /// The betas whose body lies nearest to a surface in the zero pose, vertex by vertex.
-pub(super) fn best_betas(body: &BodyModel, surface: &[Vec3]) -> [f32; 10] {
+pub(crate) fn best_betas(body: &BodyModel, surface: &[Vec3]) -> [f32; 10] {
     let mut normal = [[0.0f64; 11]; 10];
     for (v, vertex) in surface.iter().enumerate() {
         let off = (*vertex - body.template[v]).as_dvec3();

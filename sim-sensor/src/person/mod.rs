@@ -28,6 +28,7 @@ mod wrinkles;
 pub use anthropometry::{Adult, Sex};
 pub use identity::sample_betas;
 pub use individual::Individual;
+pub(crate) use individual::best_betas;
 pub use outfit::{Garment, Outfit, OutfitKind, Shoes};
 pub use paint::{Material, Paint};
 
@@ -70,7 +71,7 @@ impl Person {
         for (vertex, offset) in minimal.iter_mut().zip(&individual.offsets) {
             *vertex += *offset;
         }
-        let betas = individual::best_betas(&body, &minimal);
+        let betas = best_betas(&body, &minimal);
         let individual = Some(Arc::new(individual));
         Self::with_surface(body, (betas, minimal), individual, outfit, seed)
     }

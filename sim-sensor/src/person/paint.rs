@@ -51,6 +51,7 @@ const HAIR: [Material; 4] = [
     Material { color: [172, 136, 84], reflectance: 0.32 },
     Material { color: [28, 26, 28], reflectance: 0.10 },
 ];
+const FEET: [u8; 4] = [7, 8, 10, 11];
 const SHOES: Material = Material { color: [66, 58, 56], reflectance: 0.30 };
 
 impl Paint {
@@ -85,18 +86,21 @@ impl Paint {
     pub(crate) fn of_bones(weights: &[VertexWeights], hair: &[bool], seed: u64) -> Self {
         let random = Randomness::new(seed, 0, 0xc0);
         let cover = |(weights, hair): (&VertexWeights, &bool)| {
-            let share = |bones: &[u8]| -> f32 {
-                let of = weights.bones.iter().zip(&weights.weights);
-                of.filter(|(bone, _)| bones.contains(bone))
-                    .map(|(_, weight)| weight)
-                    .sum()
-            };
-            let skin = share(&[12, 15, 20, 21, 22, 23]);
-            let (trousers, shoe) = (share(&[1, 2, 4, 5]), share(&[7, 8, 10, 11]));
+            let skin = share(weights, &[12, 15, 20, 21, 22, 23]);
+            let (trousers, shoe) = (share(weights, &[1, 2, 4, 5]), share(weights, &FEET));
             let shirt = 1.0 - skin - trousers - shoe;
             vec4(trousers, shirt, shoe, f32::from(u8::from(*hair)))
         };
         Self { covers: weights.iter().zip(hair).map(cover).collect(), ..Self::materials(random) }
+    }
+
+    /// Somebody in shoes and nothing else that is painted on: clothes are garments of their own.
+    pub(crate) fn of_bare_skin(weights: &[VertexWeights], hair: &[bool], seed: u64) -> Self {
+        let cover = |(weights, hair): (&VertexWeights, &bool)| {
+            vec4(0.0, 0.0, share(weights, &FEET), f32::from(u8::from(*hair)))
+        };
+        let covers = weights.iter().zip(hair).map(cover).collect();
+        Self { covers, ..Self::materials(Randomness::new(seed, 0, 0xc0)) }
     }
 
     /// For a mesh in which these garments, each with so many vertices, follow the body.
@@ -142,6 +146,14 @@ impl Paint {
             .find(|&k| cover[k] > 0.5)
             .map_or(self.skin, |k| self.layers[k])
     }
+}
+
+/// How much of a vertex moves with these bones.
+fn share(weights: &VertexWeights, bones: &[u8]) -> f32 {
+    let of = weights.bones.iter().zip(&weights.weights);
+    of.filter(|(bone, _)| bones.contains(bone))
+        .map(|(_, weight)| weight)
+        .sum()
 }
 
 fn pick(materials: &[Material], random: Randomness, at: u64) -> Material {
