@@ -7,7 +7,7 @@ use effigy_registration::motion::Routine;
 use effigy_sim_sensor::{MotionChoice, OutfitKind, SensorPreset, dataset::DatasetPreset};
 use serde::de::{DeserializeOwned, IntoDeserializer as _, value};
 
-use crate::pipeline::settings::MOST_KEYFRAMES;
+use crate::{commands::evaluate::Table, pipeline::settings::MOST_KEYFRAMES};
 
 /// One depth camera in, a live avatar out.
 #[derive(Debug, Parser)]
@@ -388,6 +388,10 @@ pub(crate) struct EvaluateArgs {
 }
 
 /// Avatars of a data set's test people, by a paper's protocol.
+#[expect(
+    clippy::struct_excessive_bools,
+    reason = "flags that do not exclude each other"
+)]
 #[derive(Debug, Args)]
 pub(crate) struct EvaluateAvatarArgs {
     /// The data set (`effigy dataset make --preset cape-like`)
@@ -405,12 +409,38 @@ pub(crate) struct EvaluateAvatarArgs {
     /// Frames of each task for each person in each outfit
     #[arg(long, default_value_t = 20)]
     pub(crate) test_frames: usize,
+    /// Only these parts: few-shot, data, sensors, fitted, ablation, strangers
+    #[arg(long, value_name = "TABLE", value_delimiter = ',', value_parser = kebab::<Table>)]
+    tables: Vec<Table>,
+    /// Every test person in every outfit, not only the four of the tables
+    #[arg(long)]
+    pub(crate) all: bool,
+    /// Only these people in these outfits, named as the tables name them
+    #[arg(long, value_name = "NAME", value_delimiter = ',')]
+    subjects: Vec<String>,
+    /// Keep the rows that the JSON file has, and go on
+    #[arg(long, requires = "json")]
+    pub(crate) resume: bool,
     /// One person, two frames a task
     #[arg(long)]
     pub(crate) quick: bool,
     /// Settings of the stages (TOML); what it does not name keeps its default
     #[arg(long, value_name = "FILE")]
     pub(crate) config: Option<PathBuf>,
+}
+
+impl EvaluateAvatarArgs {
+    pub(crate) fn tables(&self) -> &[Table] {
+        if self.tables.is_empty() {
+            &Table::ALL
+        } else {
+            &self.tables
+        }
+    }
+
+    pub(crate) fn wants(&self, subject: &str) -> bool {
+        self.subjects.is_empty() || self.subjects.iter().any(|name| name == subject)
+    }
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]

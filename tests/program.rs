@@ -335,6 +335,68 @@ fn a_replay_repeats_when_the_avatar_took_over_not_when_it_would_have() {
     assert!(poses(here, "soon") == poses(here, "again"), "poses differ");
 }
 
+#[test]
+fn the_papers_protocol_goes_from_a_data_set_to_tables_and_on_from_where_it_stopped() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let make = ["dataset", "make", "--preset", "small", "--out", "small"];
+    assert_succeeds(&effigy(here, &make));
+    fs::write(here.join("quick.toml"), "[fine_tune]\nsteps = 2\n").unwrap();
+    let evaluate = |tables: &str| {
+        let files = ["--json", "rows.json", "--md", "rows.md", "--resume"];
+        let what = [
+            "evaluate",
+            "--data",
+            "small",
+            "--quick",
+            "--config",
+            "quick.toml",
+        ];
+        let arguments = [&what[..], &files, &["--tables", tables]].concat();
+        assert_succeeds(&effigy(here, &arguments));
+        let text = fs::read(here.join("rows.json")).expect("the run wrote its rows");
+        let report: serde_json::Value = serde_json::from_slice(&text).expect("they are JSON");
+        report["rows"].as_array().expect("a list").clone()
+    };
+    let first = evaluate("few-shot");
+    let methods = [
+        "bare_body",
+        "static",
+        "occupancy",
+        "scanimate",
+        "no_meta_learning",
+        "oracle",
+        "effigy",
+    ];
+    for method in methods {
+        let of: Vec<_> = first.iter().filter(|row| row["method"] == method).collect();
+        assert_eq!(of.len(), 2, "{method}: a row for each task");
+        assert!(
+            of.iter()
+                .all(|row| row["d_f_cm"].as_f64().is_some_and(f64::is_finite))
+        );
+    }
+    let both = evaluate("few-shot,ablation");
+    assert_eq!(
+        both[..first.len()],
+        first[..],
+        "what is there is kept, seconds and all"
+    );
+    let siren = both
+        .iter()
+        .find(|row| row["method"] == "siren")
+        .expect("it was added");
+    assert_eq!(
+        (&siren["data"], &siren["poses"]),
+        (&"4 frames".into(), &"true".into())
+    );
+    let table = fs::read_to_string(here.join("rows.md")).unwrap();
+    assert!(
+        table.contains("## ablation") && table.contains("## bars"),
+        "{table}"
+    );
+}
+
 /// Fine-tuning that takes next to no time.
 const QUICK: &str = "[fine_tune]\nsteps = 4\n";
 

@@ -4,6 +4,7 @@
 //! In: `effigy_registration::RegisteredFrame`s. Out: an avatar that can be posed. Works in `canonical`
 //! (star pose, metres) and `unit` space (canonical in [-1, 1]^3).
 
+pub mod baselines;
 pub mod canonicalise;
 pub mod checkpoint;
 pub mod drive;
@@ -19,6 +20,7 @@ pub mod model;
 mod neighbors;
 pub mod nn;
 pub mod pose_input;
+pub mod rendered;
 pub mod samples;
 pub mod sdf;
 pub mod skinning;

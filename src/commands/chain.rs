@@ -75,11 +75,23 @@ pub(crate) fn run(
 }
 
 fn run_chain(
-    mut input: Input,
+    input: Input,
     args: &ChainArgs,
     window: Option<Arc<SnapshotSlot>>,
     controls: &Controls,
 ) -> anyhow::Result<()> {
+    let report = report_of(input, args, window, controls)?;
+    println!("{report}\nwritten to {}", args.out.display());
+    Ok(())
+}
+
+/// Runs the chain to its end; the report is written where `args` say, and returned.
+pub(crate) fn report_of(
+    mut input: Input,
+    args: &ChainArgs,
+    window: Option<Arc<SnapshotSlot>>,
+    controls: &Controls,
+) -> anyhow::Result<Report> {
     let clock = Clock::start();
     let body = body_model(args.body.as_deref())?;
     let mut settings = Settings::load(args.config.as_deref())?;
@@ -142,8 +154,7 @@ fn run_chain(
     if let Some(path) = &args.json {
         report.write(path)?;
     }
-    println!("{report}\nwritten to {}", args.out.display());
-    Ok(())
+    Ok(report)
 }
 
 /// The built-in body, or a file's.

@@ -3,6 +3,7 @@
 
 mod contact;
 mod free_space;
+mod snippet;
 mod unpose;
 
 use std::sync::Arc;
@@ -21,6 +22,7 @@ use crate::{
     skinning::{ClosestBodyPoint, ClosestBodyPointConfig, Skinning, Warp},
 };
 use contact::Contacts;
+pub use snippet::SnippetConfig;
 use unpose::Unposer;
 
 /// Which points are taken from a frame, and which of them are believed.
@@ -52,6 +54,8 @@ pub struct CanonicaliseConfig {
     /// Background pixels between these distances from the person's outline give empty points: farther than
     /// the mask can err, nearer than clothes can matter.
     pub beside_outline_px: [u32; 2],
+    /// How a keyframe's neighbours in time are averaged with it, where there are any.
+    pub snippet: SnippetConfig,
     pub skinning: ClosestBodyPointConfig,
     pub seed: u64,
 }
@@ -71,6 +75,7 @@ impl Default for CanonicaliseConfig {
             free_in_front_m: [0.02, 0.15],
             max_free_distance_to_body_m: 0.06,
             beside_outline_px: [3, 14],
+            snippet: SnippetConfig::default(),
             skinning: ClosestBodyPointConfig::default(),
             seed: 0,
         }
@@ -181,6 +186,22 @@ impl Canonicaliser {
             free_in_unit,
         };
         Some((samples, counts))
+    }
+
+    /// As [`Self::process`], with the noise averaged over frames just before and after, each in its own pose.
+    pub fn process_snippet(
+        &self,
+        keyframe: &RegisteredFrame,
+        neighbours: &[RegisteredFrame],
+    ) -> Option<(CanonicalSamples, CanonicaliseCounts)> {
+        let (samples, counts) = self.process(keyframe)?;
+        let others: Vec<CanonicalSamples> = neighbours
+            .iter()
+            .filter_map(|frame| Some(self.process(frame)?.0))
+            .collect();
+        let metres_per_unit = self.subject.unit_box.metres_per_unit();
+        let fused = snippet::fused(samples, &others, metres_per_unit, self.config.snippet);
+        Some((fused, counts))
     }
 
     /// The person's pixels that have a say, as world points.

@@ -10,8 +10,11 @@ use crate::{hyper::RateConfig, nn::ThreadsConfig, sdf::loss::LossConfig};
 #[serde(default, deny_unknown_fields)]
 pub struct FineTuneConfig {
     pub seed: u64,
-    /// Adam steps, each over all keyframes.
+    /// Adam steps.
     pub steps: u32,
+    /// Keyframes that a step learns from, drawn anew each time; 0 for all of them. With a few it is all: only where
+    /// hundreds are learned from would each step take too long.
+    pub frames_per_step: usize,
     /// Steps over which the rates rise from zero: the moments are still empty.
     pub warm_up_steps: u32,
     /// The share of the steps at the end over which the rates fall to zero; the absolute values in the
@@ -33,6 +36,7 @@ impl Default for FineTuneConfig {
         Self {
             seed: 1,
             steps: 400,
+            frames_per_step: 0,
             warm_up_steps: 10,
             decay_share: 0.5,
             held_out_share: 0.1,

@@ -1,9 +1,9 @@
-//! The stage itself: one Adam step over all keyframes at a time.
+//! The stage itself: one Adam step at a time, over all keyframes or some of them.
 
 use std::ops::ControlFlow;
 
 use glam::Vec3;
-use rand::{SeedableRng as _, rngs::StdRng};
+use rand::{RngExt as _, SeedableRng as _, rngs::StdRng};
 use serde::{Deserialize, Serialize};
 
 use super::{FineTuneConfig, sampling::KeyframePoints};
@@ -122,13 +122,15 @@ impl FineTuner {
         })
     }
 
-    /// One Adam step over all keyframes; the loss before it.
+    /// One Adam step over all keyframes, or as many as a step takes; the loss before it.
     pub fn step(&mut self) -> Result<LossTerms, AvatarError> {
+        let taken = self.draw_keyframes();
         let drawn = self.points.iter_mut().zip(&mut self.known);
-        for (keyframe, (points, known)) in self.keyframes.iter().zip(drawn) {
-            keyframe.draw(&self.config.sampling, &mut self.rng, points, known);
+        for (&keyframe, (points, known)) in taken.iter().zip(drawn) {
+            self.keyframes[keyframe].draw(&self.config.sampling, &mut self.rng, points, known);
         }
-        let (cache, parameters) = self.network.forward(&self.poses);
+        let poses: Vec<_> = taken.iter().map(|&keyframe| self.poses[keyframe]).collect();
+        let (cache, parameters) = self.network.forward(&poses);
         let frames: Vec<_> = parameters
             .iter()
             .zip(self.points.iter().zip(&self.known))
@@ -146,6 +148,20 @@ impl FineTuner {
         self.optimizer.step(&mut self.network, &gradient, share);
         self.step += 1;
         Ok(terms)
+    }
+
+    /// The keyframes of the next step, none twice.
+    fn draw_keyframes(&mut self) -> Vec<usize> {
+        let count = self.keyframes.len();
+        let mut numbers: Vec<usize> = (0..count).collect();
+        let wanted = self.config.frames_per_step;
+        if (1..count).contains(&wanted) {
+            for place in 0..wanted {
+                numbers.swap(place, self.rng.random_range(place..count));
+            }
+            numbers.truncate(wanted);
+        }
+        numbers
     }
 
     /// Mean distance to the surface of points that no step has seen, weighted as the loss weighs them.

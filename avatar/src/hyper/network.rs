@@ -9,7 +9,9 @@ use super::{
     blob::Precision,
     config::HyperConfig,
     heads::{Head, HeadCache, HeadGradient},
-    pose_encoder::{CODE_SIZE, EncoderCache, EncoderGradient, FEATURE_SIZE, PoseEncoder},
+    pose_encoder::{
+        CODE_SIZE, EncoderCache, EncoderGradient, EncoderKind, FEATURE_SIZE, PoseEncoder,
+    },
 };
 use crate::{PoseField, PoseInput, SignedDistanceField, nn::linear::Linear, sdf::SirenField};
 
@@ -103,6 +105,21 @@ impl HyperNetwork {
         let mut rng = StdRng::seed_from_u64(seed);
         let meta = SirenField::init(config.field, &mut rng);
         Self::init(config, &meta, &mut rng)
+    }
+
+    /// The same `phi*`, with an encoder and heads that know nothing.
+    pub fn with_fresh_heads(&self, seed: u64) -> Self {
+        Self::init(
+            self.config,
+            &self.meta_field(),
+            &mut StdRng::seed_from_u64(seed),
+        )
+    }
+
+    /// Told the pose as bare quaternions instead of learned features: an ablation, which files cannot hold.
+    pub fn with_quaternions(mut self) -> Self {
+        self.encoder.kind = EncoderKind::Quaternions;
+        self
     }
 
     pub fn config(&self) -> HyperConfig {
@@ -500,6 +517,25 @@ mod tests {
                 );
             }
         }
+    }
+
+    #[test]
+    fn quaternions_reach_the_heads_and_nothing_of_the_encoder_learns() {
+        let mut rng = StdRng::seed_from_u64(8);
+        let network = moved(SMALL, &mut rng).with_quaternions();
+        let poses = [pose(&mut rng), pose(&mut rng)];
+        let (cache, parameters) = network.forward(&poses);
+        assert_ne!(parameters[0], parameters[1]);
+        let bars: Vec<_> = parameters.iter().map(Vec::as_slice).collect();
+        let gradient = network.backward(cache, &bars);
+        assert!(
+            gradient
+                .encoder
+                .global
+                .output_bar
+                .iter()
+                .all(|bar| *bar == 0.0)
+        );
     }
 
     #[test]

@@ -8,6 +8,7 @@ use rand::Rng;
 
 use crate::{
     PoseInput,
+    baselines::{QUATERNION_NUMBERS, quaternions},
     nn::linear::{Linear, OuterGradient},
 };
 
@@ -20,8 +21,19 @@ pub(crate) const GLOBAL_INPUTS: usize = JOINT_COUNT * (9 + 3);
 /// Length of the pose code.
 pub(crate) const CODE_SIZE: usize = JOINT_COUNT * FEATURE_SIZE;
 
+/// What a pose becomes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) enum EncoderKind {
+    /// Features learned along the skeleton.
+    #[default]
+    Bones,
+    /// 23 unit quaternions, and zeros: the paper's ablation. No file holds such a network.
+    Quaternions,
+}
+
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct PoseEncoder {
+    pub(crate) kind: EncoderKind,
     pub(crate) global: Linear,
     /// Hidden and output layer of each joint.
     pub(crate) joints: Vec<[Linear; 2]>,
@@ -47,6 +59,7 @@ pub(crate) struct EncoderGradient {
 impl PoseEncoder {
     pub(crate) fn init(rng: &mut impl Rng) -> Self {
         Self {
+            kind: EncoderKind::Bones,
             global: Linear::uniform(GLOBAL_INPUTS, FEATURE_SIZE, rng),
             joints: (0..JOINT_COUNT)
                 .map(|_| {
@@ -61,6 +74,7 @@ impl PoseEncoder {
 
     pub(crate) fn zeros() -> Self {
         Self {
+            kind: EncoderKind::Bones,
             global: Linear::zeros(GLOBAL_INPUTS, FEATURE_SIZE),
             joints: vec![
                 [
@@ -96,6 +110,12 @@ impl PoseEncoder {
             }
             joints.push([input, activation]);
         }
+        if self.kind == EncoderKind::Quaternions {
+            code.fill(0.0);
+            for (row, pose) in code.chunks_exact_mut(CODE_SIZE).zip(poses) {
+                row[..QUATERNION_NUMBERS].copy_from_slice(&quaternions(pose));
+            }
+        }
         EncoderCache { global_input, joints, code }
     }
 
@@ -103,6 +123,10 @@ impl PoseEncoder {
     /// `code_bar` [poses, 144]
     pub(crate) fn backward(&self, cache: EncoderCache, mut code_bar: Vec<f32>) -> EncoderGradient {
         let rows = code_bar.len() / CODE_SIZE;
+        if self.kind == EncoderKind::Quaternions {
+            // Nothing of the code was learned.
+            code_bar.fill(0.0);
+        }
         let mut global_bar = vec![0.0; rows * FEATURE_SIZE];
         let mut gradients = Vec::with_capacity(JOINT_COUNT);
         let layers = self.joints.iter().zip(cache.joints).enumerate().rev();

@@ -3,6 +3,7 @@
 //! Matrices are row-major `f32` slices; a batch has one row an element. Nothing here starts a thread.
 
 pub(crate) mod adam;
+pub(crate) mod field_mlp;
 pub(crate) mod layer_norm;
 pub(crate) mod linear;
 pub(crate) mod matmul;

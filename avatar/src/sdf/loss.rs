@@ -127,6 +127,11 @@ impl Scale {
         let inverse = |sum: f64| if sum > 0.0 { (1.0 / sum) as f32 } else { 0.0 };
         Self { data: inverse(data), eikonal: inverse(all) }
     }
+
+    /// What a point of this weight counts in a mean over all data.
+    pub(crate) fn of_data(self, weight: f32) -> f32 {
+        self.data * weight
+    }
 }
 
 /// The loss at one point and its derivatives by the value and by the spatial gradient.

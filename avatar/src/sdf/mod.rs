@@ -14,6 +14,7 @@ use glam::Vec3;
 
 pub use config::{OMEGA, SirenConfig};
 pub use field::SirenField;
+pub(crate) use sincos::sincos;
 
 /// Anything that can be meshed and driven. Values are in unit-space lengths.
 pub trait SignedDistanceField: Sync {

@@ -83,7 +83,7 @@ impl Paint {
 
     /// Somebody else's character, of whose pictures nothing is left: trousers on legs, a shirt on trunk and arms,
     /// shoes, and hair on the upper part of the head.
-    pub(crate) fn of_bones(weights: &[VertexWeights], hair: &[bool], seed: u64) -> Self {
+    pub fn of_bones(weights: &[VertexWeights], hair: &[bool], seed: u64) -> Self {
         let random = Randomness::new(seed, 0, 0xc0);
         let cover = |(weights, hair): (&VertexWeights, &bool)| {
             let skin = share(weights, &[12, 15, 20, 21, 22, 23]);

@@ -7,7 +7,8 @@ use anyhow::bail;
 use effigy_registration::smpl::builtin;
 use serde::Serialize;
 
-use self::tracking::{Suite, Table};
+pub(crate) use self::avatar::Table;
+use self::tracking::Suite;
 use crate::{
     cli::{EvaluateArgs, EvaluateTrackingArgs, EvaluateWhat, Protocol},
     files, interrupt,
@@ -35,7 +36,7 @@ struct Report<'a> {
     machine: Machine,
     quick: bool,
     #[serde(flatten)]
-    table: &'a Table,
+    table: &'a tracking::Table,
 }
 
 fn evaluate_tracking(args: &EvaluateTrackingArgs) -> anyhow::Result<()> {

@@ -7,13 +7,13 @@ use effigy_avatar::{
     CanonicalSamples, Canonicaliser,
     meta::{HeldOut, PersonFrame},
 };
-use effigy_fusion::{TriangleMesh, clean::Cleaner};
+use effigy_fusion::TriangleMesh;
 use effigy_registration::BodyModel;
 use effigy_sim_sensor::dataset::Sequence;
 
 use super::people::{as_is, frame_of};
 use crate::{
-    commands::evaluate::avatar::subject::{protocol_calibration, seen},
+    commands::evaluate::avatar::{Camera, Lesson, Views},
     pipeline::{evaluate::evenly_placed, settings::Settings},
 };
 
@@ -43,21 +43,20 @@ impl Judge {
         body: &Arc<BodyModel>,
         settings: &Settings,
     ) -> anyhow::Result<Self> {
-        let calibration = protocol_calibration();
+        let mut views = Views::new(Camera::Paper, &settings.clean, 0);
         let canonicaliser = Canonicaliser::new(
             Arc::clone(body),
             &sequence.betas,
             settings.canonicalise.clone(),
         )?
-        .with_camera(&calibration.depth);
-        let mut cleaner = Cleaner::new(calibration, settings.clean.clone());
+        .with_camera(views.camera());
         let subject = canonicaliser.subject();
         let places = evenly_placed(sequence.frames.len(), 2 * FRAMES);
         let learned = places.iter().step_by(2).enumerate();
         let samples = learned
             .map(|(number, &frame)| {
                 let yaw_rad = (number + 1) as f32 * std::f32::consts::FRAC_PI_4;
-                let view = seen(sequence, (frame, yaw_rad), number, &mut cleaner)?;
+                let view = views.keyframe(&Lesson { sequence, frame, yaw_rad })?;
                 let (samples, _) = canonicaliser.process(&view).context("poses are known")?;
                 Ok(samples)
             })

@@ -4,15 +4,24 @@ use std::{ops::ControlFlow, sync::Arc};
 
 use anyhow::Context as _;
 use effigy_avatar::{
-    Avatar, CanonicalSamples, Canonicaliser, PoseField, PoseInput, SignedDistanceField,
-    TopologyConfig, extract_posed,
+    Avatar, CanonicalSamples, CanonicaliseConfig, Canonicaliser, PoseField, PoseInput,
+    SignedDistanceField, TopologyConfig,
+    baselines::{self, Architecture, BodyLabels, ConditionedField, PoseMap},
+    extract_posed,
     fine_tune::{FineTuneConfig, fine_tune},
-    hyper::{HyperNetwork, PRIOR_CONFIG},
+    hyper::{HyperNetwork, PRIOR_CONFIG, RateConfig},
+    mesher,
 };
 use effigy_fusion::{TriangleMesh, mesh::sample::sample_surface};
 use effigy_registration::{BodyModel, BodyParams};
 
-use super::subject::Subject;
+use super::{
+    fitted::track,
+    plan::{Data, Job, Keyframes, Method, Poses},
+    pretrain::Pretrained,
+    subject::Subject,
+    views::Views,
+};
 use crate::{
     interrupt,
     pipeline::{clock::Clock, evaluate::RESOLUTION, settings::Settings},
@@ -22,119 +31,249 @@ use crate::{
 const ORACLE_POINTS: usize = 5000;
 
 /// The oracle may take its time.
-const ORACLE_STEPS_FACTOR: u32 = 3;
+const ORACLE_STEPS_FACTOR: u32 = 6;
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
-#[serde(rename_all = "snake_case")]
-pub(super) enum Method {
-    /// The minimal body.
-    BareBody,
-    /// One surface for all poses: the same network, always given the same pose.
-    Static,
-    /// From random parameters instead of the prior, with as many steps.
-    NoMetaLearning,
-    Effigy,
-    /// The same network, fitted to the whole true surface of the very frames it is judged on.
-    Oracle,
-}
+/// With more keyframes than this, each step learns from so many of them.
+const FRAMES_PER_STEP: usize = 8;
 
-impl Method {
-    pub(super) const ALL: [Self; 5] = [
-        Self::BareBody,
-        Self::Static,
-        Self::NoMetaLearning,
-        Self::Effigy,
-        Self::Oracle,
-    ];
+/// More frames are seen as often each as eight are, but no more steps are taken than this many times the live chain's.
+const MOST_STEPS_FACTOR: u32 = 4;
 
-    pub(super) fn name(self) -> &'static str {
-        match self {
-            Self::BareBody => "bare_body",
-            Self::Static => "static",
-            Self::NoMetaLearning => "no_meta_learning",
-            Self::Effigy => "effigy",
-            Self::Oracle => "oracle",
-        }
-    }
-}
+/// Other people's ways take this many times our steps, each over half the keyframes: about five times our time.
+const BASELINE_STEPS_FACTOR: u32 = 4;
+const BASELINE_FRAMES_PER_STEP: usize = 4;
+/// Adam's rates of networks that start from nothing, and of those that know people.
+const BASELINE_RATE: f32 = 5e-4;
+const ABLATION_RATE: f32 = 2e-4;
 
 /// A method that has learned what it can of one person.
-pub(super) enum Fitted {
-    BareBody(Arc<BodyModel>),
-    Avatar(Box<(Avatar, Canonicaliser)>),
+pub(super) struct Fitted {
+    body: Arc<BodyModel>,
+    betas: [f32; 10],
+    learned: Option<(Avatar, Canonicaliser)>,
 }
 
 impl Fitted {
-    /// The surface in a pose.
+    /// The surface in a true pose: the pelvis of the shape that is known lies on that of the true one.
     pub(super) fn posed(&self, params: &BodyParams) -> TriangleMesh {
-        match self {
-            Self::BareBody(body) => {
-                let mut mesh =
-                    TriangleMesh::new(body.pose(params).vertices, body.triangles.clone());
-                mesh.compute_normals();
-                mesh
-            }
-            Self::Avatar(learned) => {
-                let (avatar, canonicaliser) = &**learned;
-                extract_posed(avatar, &**canonicaliser.skinning(), params, RESOLUTION)
-            }
+        let pelvis = |betas| self.body.joints(&self.body.shaped_vertices(betas))[0];
+        let trans = params.trans + pelvis(&params.betas) - pelvis(&self.betas);
+        let params = BodyParams { betas: self.betas, trans, ..*params };
+        if let Some((avatar, canonicaliser)) = &self.learned {
+            let resolution = resolution(avatar, &params);
+            return extract_posed(avatar, &**canonicaliser.skinning(), &params, resolution);
         }
+        let vertices = self.body.pose(&params).vertices;
+        let mut mesh = TriangleMesh::new(vertices, self.body.triangles.clone());
+        mesh.compute_normals();
+        mesh
     }
 }
 
-pub(super) fn fit(
-    method: Method,
-    subject: &Subject,
-    body: &Arc<BodyModel>,
-    settings: &Settings,
-    clock: Clock,
-) -> anyhow::Result<Fitted> {
-    if method == Method::BareBody {
-        return Ok(Fitted::BareBody(Arc::clone(body)));
-    }
-    let params = subject.keyframes[0]
-        .params()
-        .context("true poses are known")?;
-    let config = settings.canonicalise.clone();
-    let canonicaliser =
-        Canonicaliser::new(Arc::clone(body), &params.betas, config)?.with_camera(&subject.camera);
-    let seen = || -> Vec<CanonicalSamples> {
-        let frames = subject.keyframes.iter();
-        frames
-            .filter_map(|frame| Some(canonicaliser.process(frame)?.0))
-            .collect()
-    };
-    let one_pose = canonicaliser.subject().pose_input(&params.theta);
-    let prior = || settings.prior_network(body.identity);
-    let mut tuning = settings.fine_tune;
-    let (start, samples) = match method {
-        Method::Oracle => {
-            tuning.steps *= ORACLE_STEPS_FACTOR;
-            (prior()?, whole_surfaces(subject, &canonicaliser))
-        }
-        Method::NoMetaLearning => (HyperNetwork::untrained(PRIOR_CONFIG, tuning.seed), seen()),
-        Method::Static => {
-            let in_one_pose = seen()
-                .into_iter()
-                .map(|samples| CanonicalSamples { pose: one_pose, ..samples });
-            (prior()?, in_one_pose.collect())
-        }
-        Method::Effigy | Method::BareBody => (prior()?, seen()),
-    };
-    let network = tuned(start, &samples, &canonicaliser, &tuning, clock)?;
-    let field: Arc<dyn PoseField> = if method == Method::Static {
-        Arc::new(OnePose { network, pose: one_pose })
+/// The paper's grid, or a coarse one where a field is noise: on a fine one it would have millions of surfaces.
+fn resolution(avatar: &Avatar, params: &BodyParams) -> usize {
+    const COARSE: usize = 64;
+    /// A body has some 3,300 vertices on the coarse grid.
+    const MOST_VERTICES: usize = 20_000;
+    let pose = avatar.subject.pose_input(&params.theta);
+    let coarse = mesher::extract(&*avatar.field.field(&pose), COARSE);
+    if coarse.vertices.len() > MOST_VERTICES {
+        COARSE
     } else {
-        Arc::new(network)
+        RESOLUTION
+    }
+}
+
+/// What all methods are given.
+pub(super) struct Given<'a> {
+    pub(super) subject: &'a Subject,
+    pub(super) body: &'a Arc<BodyModel>,
+    pub(super) settings: &'a Settings,
+    /// What an ablation's network starts from.
+    pub(super) pretrained: Option<Pretrained>,
+    pub(super) clock: Clock,
+}
+
+/// A fitted method, how many frames it learned from and how long that took: canonicalising and learning count,
+/// simulating, cleaning and tracking do not.
+pub(super) struct Outcome {
+    pub(super) fitted: Fitted,
+    /// Frames that were to be learned from, and those that were: what is not tracked is not.
+    pub(super) asked: usize,
+    pub(super) learned_from: usize,
+    pub(super) seconds: f64,
+}
+
+pub(super) fn fit(job: &Job, given: &Given<'_>) -> anyhow::Result<Outcome> {
+    let (seen, seconds) = see(job, given)?;
+    let Seen { asked, .. } = seen;
+    let learned_from = seen.samples.len();
+    let betas = seen.canonicaliser.subject().betas;
+    let body = Arc::clone(given.body);
+    if job.method == Method::BareBody {
+        let fitted = Fitted { body, betas, learned: None };
+        return Ok(Outcome { fitted, asked, learned_from, seconds: 0.0 });
+    }
+    let start = given.clock.secs();
+    let avatar = learned(job, &seen, given)?;
+    let seconds = seconds + given.clock.secs() - start;
+    let fitted = Fitted { body, betas, learned: Some((avatar, seen.canonicaliser)) };
+    Ok(Outcome { fitted, asked, learned_from, seconds })
+}
+
+/// What a method learns from.
+struct Seen {
+    canonicaliser: Canonicaliser,
+    samples: Vec<CanonicalSamples>,
+    asked: usize,
+}
+
+/// Looks at the frames a job learns from, and says how long canonicalising them took.
+fn see(job: &Job, given: &Given<'_>) -> anyhow::Result<(Seen, f64)> {
+    let Given { subject, body, settings, clock, .. } = given;
+    let lessons = subject.lessons(job.data, settings.keyframes.count);
+    let first = lessons.first().context("there are frames to learn from")?;
+    let mut views = Views::new(job.camera, &settings.clean, job.seed);
+    let tracked = match job.poses {
+        Poses::True => None,
+        Poses::Fitted => Some(track(&lessons, &mut views, body, &settings.track)?),
     };
-    let avatar = Avatar::new(
+    let betas = tracked
+        .as_ref()
+        .map_or(first.sequence.betas, |tracked| tracked.betas);
+    let config = CanonicaliseConfig { seed: job.seed, ..settings.canonicalise.clone() };
+    let canonicaliser =
+        Canonicaliser::new(Arc::clone(body), &betas, config)?.with_camera(views.camera());
+    let (mut samples, mut seconds) = (Vec::new(), 0.0);
+    let mut take = |keyframe, neighbours: &[_]| {
+        let start = clock.secs();
+        let seen = match job.keyframes {
+            Keyframes::Single => canonicaliser.process(&keyframe),
+            Keyframes::Snippet => canonicaliser.process_snippet(&keyframe, neighbours),
+        };
+        samples.extend(seen.map(|(samples, _)| samples));
+        seconds += clock.secs() - start;
+    };
+    match (job.method, tracked) {
+        (Method::Oracle, _) => samples = whole_surfaces(subject, &canonicaliser),
+        (Method::BareBody, None) => {}
+        (_, Some(tracked)) => {
+            for (keyframe, before) in tracked.keyframes {
+                take(keyframe, &before);
+            }
+        }
+        (_, None) => {
+            for lesson in &lessons {
+                let keyframe = views.keyframe(lesson)?;
+                let neighbours = match job.keyframes {
+                    Keyframes::Single => Vec::new(),
+                    Keyframes::Snippet => views.neighbours(lesson)?,
+                };
+                take(keyframe, &neighbours);
+            }
+        }
+    }
+    let asked = lessons.len();
+    Ok((Seen { canonicaliser, samples, asked }, seconds))
+}
+
+fn learned(job: &Job, seen: &Seen, given: &Given<'_>) -> anyhow::Result<Avatar> {
+    let Seen { canonicaliser, samples, .. } = seen;
+    let theta = samples.first().context("no keyframe was tracked")?.theta;
+    Ok(Avatar::new(
         canonicaliser.subject(),
-        field,
+        field(job, seen, given)?,
         &**canonicaliser.skinning(),
-        &params.theta,
+        &theta,
         &TopologyConfig::default(),
-    )?;
-    Ok(Fitted::Avatar(Box::new((avatar, canonicaliser))))
+    )?)
+}
+
+/// The field that a method learns.
+fn field(job: &Job, seen: &Seen, given: &Given<'_>) -> anyhow::Result<Arc<dyn PoseField>> {
+    let Seen { canonicaliser, samples, .. } = seen;
+    let tuning = tuning(job, samples.len(), &given.settings.fine_tune);
+    let ours = |start: HyperNetwork, samples: &[CanonicalSamples]| {
+        tuned(start, samples, canonicaliser, &tuning, given.clock)
+    };
+    let prior = || given.settings.prior_network(given.body.identity);
+    Ok(match job.method {
+        Method::BareBody | Method::Effigy | Method::Oracle => Arc::new(ours(prior()?, samples)?),
+        Method::NoMetaLearning => {
+            let untrained = HyperNetwork::untrained(PRIOR_CONFIG, tuning.seed);
+            Arc::new(ours(untrained, samples)?)
+        }
+        Method::Static => {
+            let pose = samples.first().context("there are samples")?.pose;
+            let samples = samples.iter().cloned();
+            let in_one_pose: Vec<_> = samples
+                .map(|samples| CanonicalSamples { pose, ..samples })
+                .collect();
+            Arc::new(OnePose { network: ours(prior()?, &in_one_pose)?, pose })
+        }
+        Method::Occupancy | Method::Scanimate => Arc::new(baseline(job, seen, &tuning, given)?),
+        Method::Mlp
+        | Method::PositionalEncoding
+        | Method::Siren
+        | Method::HyperQuaternions
+        | Method::HyperBones => {
+            let start = given.pretrained.clone().context("the network was taught")?;
+            match start {
+                Pretrained::Hyper(network) => Arc::new(ours(*network, samples)?),
+                Pretrained::Conditioned(mut field) => {
+                    let rates = RateConfig { field: ABLATION_RATE, ..tuning.rates };
+                    let tuning = FineTuneConfig { rates, ..tuning };
+                    baselines::fit(&mut field, samples, None, &tuning, &mut go_on)?;
+                    Arc::new(field)
+                }
+            }
+        }
+    })
+}
+
+/// Other people's ways, fitted to this person alone.
+fn baseline(
+    job: &Job,
+    seen: &Seen,
+    tuning: &FineTuneConfig,
+    given: &Given<'_>,
+) -> anyhow::Result<ConditionedField> {
+    let Seen { canonicaliser, samples, .. } = seen;
+    let person = canonicaliser.subject();
+    let tuning = FineTuneConfig {
+        steps: tuning.steps * BASELINE_STEPS_FACTOR,
+        frames_per_step: BASELINE_FRAMES_PER_STEP,
+        rates: RateConfig { field: BASELINE_RATE, ..tuning.rates },
+        ..*tuning
+    };
+    let (mut field, labels) = if job.method == Method::Occupancy {
+        let labels = BodyLabels::new(given.body, person, job.seed)?;
+        let field = ConditionedField::new(Architecture::Occupancy, job.seed);
+        (field, Some(labels))
+    } else {
+        let map = PoseMap::new(person, &**canonicaliser.skinning());
+        let field = ConditionedField::new(Architecture::Scanimate, job.seed);
+        (field.with_pose_map(Arc::new(map)), None)
+    };
+    baselines::fit(&mut field, samples, labels.as_ref(), &tuning, &mut go_on)?;
+    Ok(field)
+}
+
+/// The live settings; with more frames more steps, each over as many frames as the live chain has keyframes.
+fn tuning(job: &Job, frames: usize, live: &FineTuneConfig) -> FineTuneConfig {
+    let mut tuning = FineTuneConfig { seed: job.seed, ..*live };
+    match (job.method, job.data) {
+        (Method::Oracle, _) => {
+            tuning.steps *= ORACLE_STEPS_FACTOR;
+            tuning.frames_per_step = FRAMES_PER_STEP;
+        }
+        (_, Data::Percent(_)) if frames > FRAMES_PER_STEP => {
+            tuning.steps *= MOST_STEPS_FACTOR.min((frames / FRAMES_PER_STEP) as u32);
+            tuning.frames_per_step = FRAMES_PER_STEP;
+        }
+        _ => {}
+    }
+    tuning
 }
 
 fn tuned(
@@ -145,13 +284,6 @@ fn tuned(
     clock: Clock,
 ) -> anyhow::Result<HyperNetwork> {
     let metres_per_unit = canonicaliser.subject().unit_box.metres_per_unit();
-    let mut go_on = |_: &_| {
-        if interrupt::requested() {
-            ControlFlow::Break(())
-        } else {
-            ControlFlow::Continue(())
-        }
-    };
     let secs = || clock.secs();
     Ok(fine_tune(
         start,
@@ -159,30 +291,45 @@ fn tuned(
         metres_per_unit,
         config,
         &secs,
-        &mut go_on,
+        &mut |_| go_on(),
     )?)
+}
+
+pub(super) fn go_on() -> ControlFlow<()> {
+    if interrupt::requested() {
+        ControlFlow::Break(())
+    } else {
+        ControlFlow::Continue(())
+    }
 }
 
 /// The true surfaces of the frames that are judged.
 fn whole_surfaces(subject: &Subject, canonicaliser: &Canonicaliser) -> Vec<CanonicalSamples> {
-    let of_person = canonicaliser.subject();
-    let tests = subject.tests.iter().enumerate();
+    let person = canonicaliser.subject();
+    let tests = subject.tests.iter().zip(0..);
     tests
-        .map(|(number, test)| {
-            let samples = sample_surface(&test.truth_in_star, ORACLE_POINTS, number as u64);
-            let points = samples.iter();
-            CanonicalSamples {
-                theta: test.params.theta,
-                pose: of_person.pose_input(&test.params.theta),
-                points_in_unit: points
-                    .map(|sample| of_person.unit_box.unit_from_canonical(sample.point))
-                    .collect(),
-                normals: samples.iter().map(|sample| sample.normal).collect(),
-                weights: vec![1.0; samples.len()],
-                free_in_unit: Vec::new(),
-            }
+        .map(|(test, number)| {
+            let points = sample_surface(&test.truth_in_star, ORACLE_POINTS, number);
+            person_samples(person, &test.params.theta, &points)
         })
         .collect()
+}
+
+/// A whole true surface as samples, each point of weight one.
+pub(super) fn person_samples(
+    person: &effigy_avatar::Subject,
+    theta: &[glam::Vec3; 24],
+    surface: &[effigy_fusion::mesh::sample::SurfaceSample],
+) -> CanonicalSamples {
+    let in_unit = |point| person.unit_box.unit_from_canonical(point);
+    CanonicalSamples {
+        theta: *theta,
+        pose: person.pose_input(theta),
+        points_in_unit: surface.iter().map(|sample| in_unit(sample.point)).collect(),
+        normals: surface.iter().map(|sample| sample.normal).collect(),
+        weights: vec![1.0; surface.len()],
+        free_in_unit: Vec::new(),
+    }
 }
 
 /// A network that is always given the same pose.

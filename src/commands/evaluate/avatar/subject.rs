@@ -1,19 +1,20 @@
 //! One test person in one outfit: frames to learn from, and frames to be judged on.
 
-use std::{f32::consts::FRAC_PI_4, sync::Arc};
+use std::f32::consts::FRAC_PI_4;
 
 use effigy_avatar::metrics::measured_vertices;
-use effigy_capture::{
-    Calibration, CameraModel, Distortion, Frame, FrameId, Rigid3, SensorModel, Timestamp,
+use effigy_fusion::TriangleMesh;
+use effigy_registration::BodyParams;
+use effigy_sim_sensor::{
+    OutfitKind,
+    dataset::{Dataset, Role, Sequence, SequenceEntry, Split},
 };
-use effigy_fusion::{TriangleMesh, clean::Cleaner};
-use effigy_registration::{BodyParams, RegisteredFrame, Tracking};
-use effigy_sim_sensor::dataset::{Dataset, Role, Sequence, SequenceEntry, Split, protocol_camera};
 
-use crate::pipeline::{evaluate::evenly_placed, settings::Settings};
+use super::plan::Data;
+use crate::pipeline::evaluate::evenly_placed;
 
 /// What a test frame tests.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub(super) enum Task {
     /// An action of which other frames were learned from.
@@ -26,8 +27,11 @@ pub(super) enum Task {
 pub(super) struct Subject {
     pub(super) name: String,
     pub(super) outfit: String,
-    pub(super) camera: CameraModel,
-    pub(super) keyframes: Vec<RegisteredFrame>,
+    /// What the data set knows of it; nothing yet.
+    pub(super) history_floor_cm: Option<f64>,
+    sequences: Vec<Sequence>,
+    /// Sequence and frame of what may be learned from: all frames but those that are judged.
+    teaching: Vec<(usize, usize)>,
     pub(super) tests: Vec<TestFrame>,
 }
 
@@ -40,12 +44,60 @@ pub(super) struct TestFrame {
     pub(super) measured: Vec<bool>,
 }
 
+/// A frame to learn from and the side it is seen from.
+#[derive(Clone, Copy)]
+pub(crate) struct Lesson<'a> {
+    pub(crate) sequence: &'a Sequence,
+    pub(crate) frame: usize,
+    pub(crate) yaw_rad: f32,
+}
+
+/// The sequences of one test person in one outfit.
+pub(super) type Entries = Vec<SequenceEntry>;
+
+/// Of whom the tables are made, where the data set has them: clothes that fit closely, loose ones, one that no prior
+/// learns from, and a skirt; four different people.
+const IN_THE_TABLES: [OutfitKind; 4] = [
+    OutfitKind::LongsleeveTrousers,
+    OutfitKind::LongsleeveWideTrousers,
+    OutfitKind::BlazerTrousers,
+    OutfitKind::Skirt,
+];
+
+/// Test people in outfits: the four of the tables, or all of them.
+pub(super) fn chosen(dataset: &Dataset, all: bool) -> Vec<Entries> {
+    let mut people = test_people(dataset);
+    if all {
+        return people;
+    }
+    let named: Vec<Entries> = IN_THE_TABLES
+        .iter()
+        .filter_map(|outfit| {
+            people
+                .iter()
+                .find(|entries| entries[0].plan.outfit == *outfit)
+        })
+        .cloned()
+        .collect();
+    if named.is_empty() {
+        people.truncate(IN_THE_TABLES.len());
+        return people;
+    }
+    named
+}
+
+/// A person in an outfit as tables name them.
+pub(super) fn name(entries: &[SequenceEntry]) -> String {
+    let plan = &entries[0].plan;
+    format!("{:03}-{}", plan.subject, plan.outfit.name())
+}
+
 /// The sequences of each test person in each outfit.
-pub(super) fn test_people(dataset: &Dataset) -> Vec<Vec<SequenceEntry>> {
-    let mut people: Vec<Vec<SequenceEntry>> = Vec::new();
+fn test_people(dataset: &Dataset) -> Vec<Entries> {
+    let mut people: Vec<Entries> = Vec::new();
     let tests = dataset.manifest().sequences.iter();
     for entry in tests.filter(|entry| entry.plan.split == Split::Test) {
-        let same = |people: &&mut Vec<SequenceEntry>| {
+        let same = |people: &&mut Entries| {
             let plan = &people[0].plan;
             (plan.subject, plan.outfit) == (entry.plan.subject, entry.plan.outfit)
         };
@@ -58,47 +110,54 @@ pub(super) fn test_people(dataset: &Dataset) -> Vec<Vec<SequenceEntry>> {
 }
 
 impl Subject {
-    /// `keyframes` single views, each an eighth of a turn further on (seed paper, section 4.1), spread over the
-    /// actions; `tests` frames for each task, spread over what is left.
+    /// With `tests` frames for each task, spread over all actions; those of interpolation are taken out of what may
+    /// be learned from.
     pub(super) fn load(
         dataset: &Dataset,
         entries: &[SequenceEntry],
-        (keyframes, tests): (usize, usize),
-        settings: &Settings,
+        tests: usize,
     ) -> anyhow::Result<Self> {
-        let plan = &entries[0].plan;
         let loaded = |role: Role| -> anyhow::Result<Vec<Sequence>> {
             let of_role = entries.iter().filter(|entry| entry.plan.role == role);
             of_role.map(|entry| Ok(dataset.load(entry)?)).collect()
         };
-        let (learned, held_out) = (loaded(Role::FineTune)?, loaded(Role::Extrapolation)?);
-        let (chosen, left) = spread(&all_frames(&learned), keyframes);
-        let calibration = protocol_calibration();
-        let mut cleaner = Cleaner::new(calibration.clone(), settings.clean.clone());
-        let keyframes = chosen
-            .iter()
-            .enumerate()
-            .map(|(number, &(sequence, frame))| {
-                let yaw_rad = (number + 1) as f32 * FRAC_PI_4;
-                seen(&learned[sequence], (frame, yaw_rad), number, &mut cleaner)
-            })
-            .collect::<anyhow::Result<_>>()?;
+        let (sequences, held_out) = (loaded(Role::FineTune)?, loaded(Role::Extrapolation)?);
+        let (judged, teaching) = spread(&all_frames(&sequences), tests);
+        let (extrapolated, _) = spread(&all_frames(&held_out), tests);
         let of = |task, sequences: &[Sequence], frames: &[(usize, usize)]| -> Vec<TestFrame> {
-            let (chosen, _) = spread(frames, tests);
-            chosen
-                .iter()
+            let frames = frames.iter();
+            frames
                 .map(|&(s, f)| TestFrame::new(task, &sequences[s], f))
                 .collect()
         };
-        let mut tests = of(Task::Interpolation, &learned, &left);
-        tests.extend(of(Task::Extrapolation, &held_out, &all_frames(&held_out)));
+        let mut tests = of(Task::Interpolation, &sequences, &judged);
+        tests.extend(of(Task::Extrapolation, &held_out, &extrapolated));
         Ok(Self {
-            name: format!("{:03}-{}", plan.subject, plan.outfit.name()),
-            outfit: plan.outfit.name().to_owned(),
-            camera: calibration.depth,
-            keyframes,
+            name: name(entries),
+            outfit: entries[0].plan.outfit.name().to_owned(),
+            history_floor_cm: None,
+            sequences,
+            teaching,
             tests,
         })
+    }
+
+    /// Frames spread over the actions, each seen from an eighth of a turn further on (seed paper, section 4.1); at most
+    /// `few` where few are asked for.
+    pub(super) fn lessons(&self, data: Data, few: usize) -> Vec<Lesson<'_>> {
+        let count = match data {
+            Data::Few => few,
+            Data::Percent(percent) => (self.teaching.len() * percent).div_ceil(100),
+        };
+        let (taken, _) = spread(&self.teaching, count);
+        let lessons = taken.into_iter().enumerate();
+        lessons
+            .map(|(number, (sequence, frame))| Lesson {
+                sequence: &self.sequences[sequence],
+                frame,
+                yaw_rad: (number + 1) as f32 * FRAC_PI_4,
+            })
+            .collect()
     }
 }
 
@@ -130,45 +189,6 @@ fn spread<T: Copy>(items: &[T], count: usize) -> (Vec<T>, Vec<T>) {
         .partition(|(place, _)| places.binary_search(place).is_ok());
     let values = |pairs: Vec<(usize, &T)>| pairs.into_iter().map(|(_, &value)| value).collect();
     (values(taken), values(left))
-}
-
-/// A frame as the protocol's camera sees it, with the true pose.
-pub(crate) fn seen(
-    sequence: &Sequence,
-    (frame, yaw_rad): (usize, f32),
-    number: usize,
-    cleaner: &mut Cleaner,
-) -> anyhow::Result<RegisteredFrame> {
-    let (depth, world_from_camera) = sequence.protocol_depth(frame, yaw_rad);
-    let exposure = Frame {
-        id: FrameId(number as u64),
-        timestamp: Timestamp::from_secs_f64(number as f64),
-        depth: Arc::new(depth),
-        color: None,
-    };
-    let tracking = Tracking::Tracked {
-        params: sequence.params(frame),
-        residual_rms_m: 0.0,
-        joint_confidence: [1.0; 24],
-    };
-    let clean = Arc::new(cleaner.process(&exposure)?);
-    Ok(RegisteredFrame { clean, world_from_camera, tracking })
-}
-
-pub(crate) fn protocol_calibration() -> Calibration {
-    let (intrinsics, _) = protocol_camera();
-    Calibration {
-        sensor_name: "MetaAvatar's protocol".to_owned(),
-        depth: CameraModel { intrinsics, distortion: Distortion::None },
-        color: None,
-        color_from_depth: Rigid3::IDENTITY,
-        metres_per_unit: 1e-3,
-        range_m: [1.0, 10.0],
-        rate_hz: 30.0,
-        // No noise but the millimetres' own.
-        sensor: SensorModel::TimeOfFlight { floor_m: 3e-4, slope: 0.0 },
-        world_from_camera: None,
-    }
 }
 
 #[cfg(test)]

@@ -1,0 +1,126 @@
+//! Nobody is judged on what was learned from: people, outfits and motions of the tests are none of the training's.
+
+use anyhow::ensure;
+use effigy_avatar::hyper::Provenance;
+use effigy_sim_sensor::dataset::{DatasetPlan, DatasetPreset, Manifest, Role, SequencePlan, Split};
+
+/// Refuses a data set whose test people or extrapolated actions were learned from, by its own training split or by the
+/// shipped prior.
+pub(super) fn check(manifest: &Manifest, prior: &Provenance) -> anyhow::Result<()> {
+    let plans: Vec<&SequencePlan> = manifest.sequences.iter().map(|entry| &entry.plan).collect();
+    let learned = learned_from(&prior.training);
+    check_plans(&plans, &learned.iter().collect::<Vec<_>>())
+}
+
+/// What the prior learned from, if it was a data set: its provenance names preset and seed.
+fn learned_from(training: &str) -> Vec<SequencePlan> {
+    let of_preset = |(words, preset): (&str, DatasetPreset)| {
+        let (_, rest) = training.split_once(words)?;
+        let digits = rest.split(|c: char| !c.is_ascii_digit()).next()?;
+        Some(DatasetPlan::new(preset, digits.parse().ok()?).sequences)
+    };
+    let presets = [
+        ("data set Prior of seed ", DatasetPreset::Prior),
+        ("data set CapeLike of seed ", DatasetPreset::CapeLike),
+        ("data set Small of seed ", DatasetPreset::Small),
+    ];
+    let plans = presets.into_iter().filter_map(of_preset).flatten();
+    // Of any data set only training people are learned from.
+    plans.filter(|plan| plan.split == Split::Train).collect()
+}
+
+/// No test person is a training person, and no action of extrapolation was learned from that person or in `learned`.
+fn check_plans(plans: &[&SequencePlan], learned: &[&SequencePlan]) -> anyhow::Result<()> {
+    for test in plans.iter().filter(|plan| plan.split == Split::Test) {
+        let seed = test.scenario.seed;
+        let trained = plans.iter().filter(|plan| plan.split == Split::Train);
+        if let Some(other) = trained
+            .chain(learned)
+            .find(|plan| plan.scenario.seed == seed)
+        {
+            anyhow::bail!(
+                "{} and {} are the same person, who was learned from",
+                test.name,
+                other.name
+            );
+        }
+        if test.role == Role::FineTune {
+            continue;
+        }
+        let own = plans.iter().filter(|plan| {
+            (plan.split, plan.role, plan.scenario.seed) == (Split::Test, Role::FineTune, seed)
+        });
+        for teacher in own {
+            ensure!(
+                teacher.action != test.action,
+                "{} tests an action that {} teaches",
+                test.name,
+                teacher.name
+            );
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use effigy_avatar::hyper;
+    use effigy_sim_sensor::OutfitKind;
+
+    use super::*;
+
+    fn plans(preset: DatasetPreset) -> Vec<SequencePlan> {
+        DatasetPlan::new(preset, 1).sequences
+    }
+
+    #[test]
+    fn no_test_person_was_learned_from_by_data_set_or_shipped_prior() {
+        let learned = learned_from(&hyper::prior().provenance.training);
+        for preset in [DatasetPreset::CapeLike, DatasetPreset::Small] {
+            let plans = plans(preset);
+            check_plans(
+                &plans.iter().collect::<Vec<_>>(),
+                &learned.iter().collect::<Vec<_>>(),
+            )
+            .unwrap();
+        }
+    }
+
+    #[test]
+    fn people_and_extrapolated_actions_of_the_tests_and_the_blazer_are_unknown_to_a_prior() {
+        let (prior, tests) = (plans(DatasetPreset::Prior), plans(DatasetPreset::CapeLike));
+        for test in tests.iter().filter(|plan| plan.split == Split::Test) {
+            assert!(
+                prior
+                    .iter()
+                    .all(|plan| plan.scenario.seed != test.scenario.seed),
+                "{}",
+                test.name
+            );
+            let is_new = prior.iter().all(|plan| plan.action != test.action);
+            assert!(test.role == Role::FineTune || is_new, "{}", test.name);
+        }
+        let worn = |outfit| prior.iter().any(|plan| plan.outfit == outfit);
+        assert!(!worn(OutfitKind::BlazerTrousers) && worn(OutfitKind::Skirt));
+    }
+
+    #[test]
+    fn a_test_person_among_those_learned_from_is_refused() {
+        let mut plans = plans(DatasetPreset::Small);
+        plans[0].scenario.seed = plans[1].scenario.seed;
+        assert!(check_plans(&plans.iter().collect::<Vec<_>>(), &[]).is_err());
+        let own = DatasetPlan::new(DatasetPreset::Small, 1).sequences;
+        let all: Vec<&SequencePlan> = own.iter().collect();
+        assert!(check_plans(&all, &all[1..2]).is_err());
+    }
+
+    #[test]
+    fn a_provenance_brings_back_the_people_learned_from() {
+        let learned = learned_from("effigy train hyper, --seed 4, data set Prior of seed 3");
+        assert_eq!(
+            learned.len(),
+            DatasetPlan::new(DatasetPreset::Prior, 3).sequences.len()
+        );
+        assert!(learned_from("effigy train prior --seed 1").is_empty());
+    }
+}
