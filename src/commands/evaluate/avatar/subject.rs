@@ -117,6 +117,7 @@ impl Subject {
         entries: &[SequenceEntry],
         tests: usize,
     ) -> anyhow::Result<Self> {
+        let plan = &entries[0].plan;
         let loaded = |role: Role| -> anyhow::Result<Vec<Sequence>> {
             let of_role = entries.iter().filter(|entry| entry.plan.role == role);
             of_role.map(|entry| Ok(dataset.load(entry)?)).collect()
@@ -134,8 +135,11 @@ impl Subject {
         tests.extend(of(Task::Extrapolation, &held_out, &extrapolated));
         Ok(Self {
             name: name(entries),
-            outfit: entries[0].plan.outfit.name().to_owned(),
-            history_floor_cm: None,
+            outfit: plan.outfit.name().to_owned(),
+            history_floor_cm: dataset
+                .manifest()
+                .history_floor_cm(Split::Test, plan.subject, plan.outfit)
+                .map(f64::from),
             sequences,
             teaching,
             tests,

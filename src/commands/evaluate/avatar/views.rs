@@ -131,7 +131,11 @@ impl Views {
         let paint = Paint::of_bones(
             &sequence.weights,
             &vec![false; sequence.weights.len()],
-            sequence.plan.scenario.seed,
+            sequence
+                .plan
+                .scenario
+                .as_ref()
+                .map_or(0, |scenario| scenario.seed),
         );
         let view = renderer.render(&sequence.posed_mesh(frame), &paint, &sequence.weights);
         let mut exposure = Exposure::new(&self.calibration, preset.defects());
@@ -144,7 +148,8 @@ impl Views {
 impl Lesson<'_> {
     /// The sequence's moment so many seconds later, as a sequence of one frame.
     pub(super) fn moved_by(&self, secs: f32) -> Sequence {
-        let rate_hz = self.sequence.plan.scenario.rate_hz();
+        let scenario = self.sequence.plan.scenario.as_ref();
+        let rate_hz = scenario.map_or(RATE_HZ, effigy_sim_sensor::Scenario::rate_hz);
         moment(self.sequence, self.frame as f32 + secs * rate_hz)
     }
 }
