@@ -107,17 +107,25 @@ fn train(
             ControlFlow::Continue(())
         }
     };
-    let mut training = |part: usize| Training {
+    let checkpoint = |part: usize| paths.as_ref().map(|paths| paths[part].as_path());
+    let field = train_field(Training {
         source: &ball,
         config,
         validation: Some(&validation),
-        checkpoint: paths.as_ref().map(|paths| paths[part].as_path()),
+        checkpoint: checkpoint(0),
         on_event: &mut on_event,
-    };
-    let Some(field) = train_field(training(0))? else {
+    })?;
+    let Some(field) = field else {
         return Ok(None);
     };
-    train_hyper(&field, training(1))
+    let training = Training {
+        source: &ball,
+        config,
+        validation: Some(&validation),
+        checkpoint: checkpoint(1),
+        on_event: &mut on_event,
+    };
+    train_hyper(&field, training)
 }
 
 #[test]

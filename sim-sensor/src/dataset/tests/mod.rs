@@ -269,3 +269,17 @@ fn a_skirt_knows_where_it_came_from_and_the_manifest_says_by_how_much() {
         "same bits on any number of threads"
     );
 }
+
+#[test]
+fn settings_are_chosen_on_people_whom_neither_training_nor_tests_meet() {
+    let dev = DatasetPlan::new(DatasetPreset::Dev, 1);
+    for preset in [DatasetPreset::Prior, DatasetPreset::CapeLike] {
+        for other in &DatasetPlan::new(preset, 1).sequences {
+            let met = dev
+                .sequences
+                .iter()
+                .any(|ours| seed_of(ours) == seed_of(other));
+            assert!(!met, "{}", other.name);
+        }
+    }
+}

@@ -111,7 +111,7 @@ mod tests {
             let is_new = prior.iter().all(|plan| plan.action != test.action);
             assert!(test.role == Role::FineTune || is_new, "{}", test.name);
         }
-        let worn = |outfit| prior.iter().any(|plan| plan.outfit == outfit);
+        let worn = |outfit: OutfitKind| prior.iter().any(|plan| plan.outfit == outfit);
         assert!(!worn(OutfitKind::BlazerTrousers) && worn(OutfitKind::Skirt));
     }
 
