@@ -129,6 +129,9 @@ pub enum SensorModel {
     TimeOfFlight { floor_m: f32, slope: f32 },
 }
 
+/// Nguyen's angle term at 60 degrees: what stereo's sources say of walls and people ends there.
+const GRAZING_AT_60_DEGREES: f32 = 4.0;
+
 impl SensorModel {
     fn is_valid(self) -> bool {
         match self {
@@ -147,8 +150,10 @@ impl SensorModel {
         let grazing = (theta / (std::f32::consts::FRAC_PI_2 - theta)).powi(2);
         match self {
             Self::Stereo { baseline_m, focal_px, subpixel_rms_px } => {
-                depth_m * depth_m * subpixel_rms_px / (focal_px * baseline_m)
-                    * (1.0 + 0.05 * grazing)
+                // No source has an angle term. Beyond 60 degrees windows see ever fewer of the same points in both
+                // images; that this makes them worse is our own assumption.
+                let slant = 1.0 + 0.05 * (grazing - GRAZING_AT_60_DEGREES).max(0.0);
+                depth_m * depth_m * subpixel_rms_px / (focal_px * baseline_m) * slant
             }
             Self::StructuredLight => {
                 0.0012
@@ -161,5 +166,21 @@ impl SensorModel {
                     + 0.0001 * depth_m.max(0.0) * depth_m.max(0.0).sqrt() * grazing
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn stereo_is_as_good_at_60_degrees_as_frontal_and_worse_beyond() {
+        let stereo =
+            SensorModel::Stereo { baseline_m: 0.05, focal_px: 424.0, subpixel_rms_px: 0.08 };
+        let of = |degrees: f32| stereo.sigma_m(2.0, degrees.to_radians());
+        assert!((of(0.0) - 4.0 * 0.08 / (424.0 * 0.05)).abs() < 1e-6);
+        assert!((of(60.0) / of(0.0) - 1.0).abs() < 1e-4, "{}", of(60.0));
+        assert!(of(75.0) > 1.5 * of(0.0), "{}", of(75.0));
+        assert!(of(90.0).is_finite());
     }
 }

@@ -12,8 +12,10 @@ use crate::{
 };
 
 mod interior;
+mod slant;
 
 pub use interior::{Interior, closed_mask, interior};
+pub use slant::{SLANTS_DEG, Slanted, noise_by_slant};
 
 /// Half the width of the columns in which a turned wall is measured: there its depth hardly changes.
 const HALF_WIDTH_PX: usize = 16;
@@ -152,6 +154,7 @@ fn source_sigma_m(preset: SensorPreset, view: &View, pixel: usize) -> f64 {
         }
         // sigma = z^2 s / (f B); no source has an angle term.
         SensorPreset::D435 => z * z * 0.08 / (424.0 * 0.050),
+        SensorPreset::D455 => z * z * 0.08 / (424.0 * 0.095),
         SensorPreset::Oak => z * z * 0.10 / (441.0 * 0.075),
         // Nguyen, Izadi and Lovell 2012.
         SensorPreset::Kinect => 0.0012 + 0.0019 * (z - 0.4).powi(2) + 0.0001 / z.sqrt() * grazing,

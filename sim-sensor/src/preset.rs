@@ -17,6 +17,8 @@ pub enum SensorPreset {
     Azure,
     /// `RealSense` D435: active stereo, 848x480.
     D435,
+    /// `RealSense` D455: active stereo with a wider baseline, 848x480.
+    D455,
     /// Luxonis OAK-D at 400P: stereo with 1/8 pixel steps, 640x400.
     Oak,
     /// Kinect v1: structured light, 640x480.
@@ -43,12 +45,13 @@ const METRES_PER_UNIT: f32 = 0.001;
 const RATE_HZ: f32 = 30.0;
 
 impl SensorPreset {
-    pub const ALL: [Self; 4] = [Self::Azure, Self::D435, Self::Oak, Self::Kinect];
+    pub const ALL: [Self; 5] = [Self::Azure, Self::D435, Self::D455, Self::Oak, Self::Kinect];
 
     pub fn name(self) -> &'static str {
         match self {
             Self::Azure => "azure",
             Self::D435 => "d435",
+            Self::D455 => "d455",
             Self::Oak => "oak",
             Self::Kinect => "kinect",
         }
@@ -72,7 +75,7 @@ impl SensorPreset {
     pub fn intrinsics(self) -> Intrinsics {
         let (width, height, focal_px) = match self {
             Self::Azure => (640, 576, 504.0),
-            Self::D435 => (848, 480, 424.0),
+            Self::D435 | Self::D455 => (848, 480, 424.0),
             Self::Oak => (640, 400, 441.0),
             Self::Kinect => (640, 480, 585.0),
         };
@@ -100,6 +103,12 @@ impl SensorPreset {
                 480,
                 616.0,
                 [0.12, -0.25, 6.0e-4, -3.0e-4, 0.0, 0.0, 0.0, 0.0],
+            ),
+            Self::D455 => (
+                640,
+                480,
+                386.0,
+                [-0.055, 0.065, -4.0e-4, 5.0e-4, -0.021, 0.0, 0.0, 0.0],
             ),
             Self::Oak => (
                 640,
@@ -132,6 +141,7 @@ impl SensorPreset {
             // The Azure's colour camera looks up from the tilted depth camera by 6 degrees.
             Self::Azure => (vec3(-0.032, -0.002, 0.004), [0.105, 0.002, -0.001]),
             Self::D435 => (vec3(0.015, 0.0, 0.0), [0.004, -0.003, 0.002]),
+            Self::D455 => (vec3(-0.059, 0.0, 0.0), [-0.003, 0.002, 0.001]),
             Self::Oak => (vec3(-0.0375, 0.0, 0.001), [0.002, 0.005, -0.001]),
             Self::Kinect => (vec3(-0.025, 0.0, -0.001), [-0.006, 0.004, 0.001]),
         };
@@ -143,6 +153,7 @@ impl SensorPreset {
         match self {
             Self::Azure => [0.5, 3.86],
             Self::D435 => [0.28, 6.0],
+            Self::D455 => [0.40, 6.0],
             Self::Oak => [0.35, 8.0],
             Self::Kinect => [0.5, 4.5],
         }
@@ -155,6 +166,9 @@ impl SensorPreset {
             Self::D435 => {
                 SensorModel::Stereo { baseline_m: 0.050, focal_px, subpixel_rms_px: 0.08 }
             }
+            Self::D455 => {
+                SensorModel::Stereo { baseline_m: 0.095, focal_px, subpixel_rms_px: 0.08 }
+            }
             Self::Oak => SensorModel::Stereo { baseline_m: 0.075, focal_px, subpixel_rms_px: 0.10 },
             Self::Kinect => SensorModel::StructuredLight,
         }
@@ -164,7 +178,7 @@ impl SensorPreset {
         let model = self.sensor_model();
         match self {
             Self::Azure => Defects::TimeOfFlight(TimeOfFlight::azure(model)),
-            Self::D435 => {
+            Self::D435 | Self::D455 => {
                 Defects::Stereo(Stereo { steps_per_px: 32.0, window_px: 7, ..Stereo::of(model) })
             }
             // Without a projector, plain cloth and walls leave windows with nothing to match.
@@ -180,7 +194,9 @@ impl SensorPreset {
 
     fn mount(self) -> Mount {
         match self {
-            Self::Azure | Self::D435 => Mount { height_m: 1.20, distance_m: 2.45, down_rad: 0.02 },
+            Self::Azure | Self::D435 | Self::D455 => {
+                Mount { height_m: 1.20, distance_m: 2.45, down_rad: 0.02 }
+            }
             Self::Oak => Mount { height_m: 1.20, distance_m: 3.00, down_rad: 0.0 },
             Self::Kinect => Mount { height_m: 1.20, distance_m: 3.30, down_rad: 0.0 },
         }

@@ -37,7 +37,11 @@ fn main() -> Result<(), Box<dyn Error>> {
 /// Millimetres: measured / source.
 fn print_sigma(turned_rad: f32, title: &str) {
     println!("\nsigma on a wall, {title}, mm: measured / source (fill rate)");
-    println!("| depth | azure | d435 | oak | kinect |\n|---|---|---|---|---|");
+    let names = SensorPreset::ALL.map(SensorPreset::name).join(" | ");
+    println!(
+        "| depth | {names} |\n|---|{}",
+        "---|".repeat(SensorPreset::ALL.len())
+    );
     for depth_m in DEPTHS_M {
         print!("| {depth_m:.1} m |");
         for preset in SensorPreset::ALL {

@@ -6,12 +6,17 @@ use effigy_capture::{Calibration, FrameId, Intrinsics, Rigid3, SensorModel};
 use effigy_registration::{motion::Routine, smpl::builtin};
 use effigy_sim_sensor::{
     MotionChoice, OutfitKind, Room, Scenario, SensorPreset, Truth,
-    measure::{Interior, closed_mask, interior},
+    measure::{Interior, SLANTS_DEG, closed_mask, interior, noise_by_slant},
     noise::{Exposure, stereo::Stereo},
     preset::Defects,
     render::{Renderer, View},
 };
 use glam::{Quat, vec3};
+
+/// The VCL frames' camera.
+const D415: Intrinsics =
+    Intrinsics { width: 640, height: 360, fx: 482.0, fy: 482.0, cx: 315.2, cy: 175.0 };
+const D415_BASELINE_M: f32 = 0.055;
 
 /// A depth image in metres.
 struct Depth {
@@ -45,7 +50,28 @@ pub(crate) fn print(data: &Path) -> Result<(), Box<dyn Error>> {
         "d415 simulated, s = 0.03",
         person_before_a_room(&simulated_d415(0.03)),
     );
+    println!("\nnoise of disparity by the surface's angle, px (pixels)");
+    let classes = SLANTS_DEG
+        .windows(2)
+        .map(|ends| format!("{}-{} degrees", ends[0], ends[1]));
+    println!(
+        "| | {} |\n|---|---|---|---|---|",
+        classes.collect::<Vec<_>>().join(" | ")
+    );
+    slants("vcl d415, real", &depth);
+    slants("d415 simulated, s = 0.03", &simulated_d415(0.03));
     Ok(())
+}
+
+/// As measured by a camera like the VCL frame's.
+fn slants(name: &str, depth: &Depth) {
+    let mask = closed_mask(&depth.metres, depth.width, [0.9, 1.7], 4);
+    let found = noise_by_slant(&depth.metres, &D415, &mask);
+    let cells = found.map(|class| {
+        let px = class.sigma_per_m * f64::from(D415.fx * D415_BASELINE_M);
+        format!("{px:.4} ({})", class.pixels)
+    });
+    println!("| {name} | {} |", cells.join(" | "));
 }
 
 fn row(name: &str, found: Interior) {
@@ -94,11 +120,11 @@ fn simulated_kinect() -> Interior {
     interior(&depth.metres, depth.width, &mask)
 }
 
-/// As the VCL frame: 640x360, f = 482 px, baseline 55 mm, head to knees at 1.27 m.
+/// As the VCL frame: head to knees at 1.27 m.
 fn simulated_d415(subpixel_rms_px: f32) -> Depth {
-    let camera = Intrinsics { width: 640, height: 360, fx: 482.0, fy: 482.0, cx: 315.2, cy: 175.0 };
-    let model = SensorModel::Stereo { baseline_m: 0.055, focal_px: camera.fx, subpixel_rms_px };
-    let view = person(camera, 1.37, 1.25);
+    let model =
+        SensorModel::Stereo { baseline_m: D415_BASELINE_M, focal_px: D415.fx, subpixel_rms_px };
+    let view = person(D415, 1.37, 1.25);
     exposed(
         &view,
         &SensorPreset::D435.calibration(),

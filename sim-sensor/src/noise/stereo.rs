@@ -94,7 +94,7 @@ impl Stereo {
             &mut buffers.texture,
             &mut buffers.scratch,
         );
-        self.fatten(size, buffers);
+        self.fatten(view, buffers);
         // Rounding to sub-pixel steps adds a twelfth of a squared step of its own.
         let rounding = 1.0 / (self.steps_per_px * self.steps_per_px * 12.0);
         let noise_px = (self.subpixel_rms_px * self.subpixel_rms_px - rounding)
@@ -132,11 +132,20 @@ impl Stereo {
 
     /// As in [`SensorModel::sigma_m`]: the model and the simulation agree on slanted surfaces too.
     fn grazing_gain(view: &View, pixel: usize) -> f32 {
-        if view.cosine[pixel] > 0.95 {
+        // Up to 60 degrees the model has no angle term.
+        if view.cosine[pixel] > 0.5 {
             return 1.0;
         }
         let model = SensorModel::Stereo { baseline_m: 1.0, focal_px: 1.0, subpixel_rms_px: 1.0 };
         model.sigma_m(1.0, view.incidence_rad[pixel])
+    }
+
+    /// How fast disparity changes along rows or columns, over the plane of the surface itself.
+    fn slope(&self, view: &View, pixel: usize) -> f32 {
+        let normal = view.normals[pixel];
+        // One over depth is `normal . ray / offset`.
+        let offset_m = (normal.dot(view.ray(pixel)) * view.depth_m[pixel]).abs();
+        self.baseline_m * normal.x.abs().max(normal.y.abs()) / offset_m.max(1e-3)
     }
 
     /// How much more texture a dark or slanted surface needs to be matched.
@@ -148,7 +157,8 @@ impl Stereo {
 
     /// A window that straddles an edge takes the nearer surface's disparity: objects grow at their edges, by half
     /// a window on average, and the edge wobbles with the texture around it.
-    fn fatten(&self, [width, height]: [usize; 2], buffers: &mut Buffers) {
+    fn fatten(&self, view: &View, buffers: &mut Buffers) {
+        let [width, height] = [view.width, view.height];
         let mean_px = self.window_px as f32 * 0.5;
         buffers.fattened.clone_from(&buffers.disparity);
         for y in 0..height {
@@ -157,7 +167,9 @@ impl Stereo {
                 let grown_px = mean_px + WOBBLE * mean_px * buffers.texture[pixel];
                 let grown = (grown_px.round().max(0.0) as usize).min(self.window_px);
                 let nearest = nearest_around([x, y], grown, [width, height], buffers);
-                if nearest > buffers.disparity[pixel] + EDGE_STEP_PX {
+                let step_px = nearest - buffers.disparity[pixel] - EDGE_STEP_PX;
+                // What rises as its own plane does is a slope, and no edge.
+                if step_px > 0.0 && step_px > grown as f32 * self.slope(view, pixel) {
                     buffers.fattened[pixel] = nearest;
                 }
             }
