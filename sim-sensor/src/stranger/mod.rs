@@ -15,6 +15,7 @@ mod character;
 mod document;
 mod limbs;
 mod skeleton;
+mod skin;
 #[cfg(test)]
 mod tests;
 

@@ -279,7 +279,7 @@ fn files_that_hold_nobody_are_told_what_is_missing() {
     let cases: [(PathBuf, &str); 6] = [
         (
             written("no_skin.gltf", small("", ["a", "b", "c"]).as_bytes()),
-            "a mesh with a skin",
+            "a mesh with a skin, a character whose bones move it; export it together with its armature",
         ),
         (
             written(
