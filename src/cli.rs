@@ -327,6 +327,36 @@ pub(crate) enum TrainWhat {
         after_help = "Example: effigy train hyper --data data/prior --start sdf.safetensors --out prior.safetensors"
     )]
     Hyper(TrainHyperArgs),
+    /// Train the skinning networks on a data set's training people
+    #[command(
+        after_help = "Example: effigy train skinning --data data/prior --out skinning.safetensors"
+    )]
+    Skinning(TrainSkinningArgs),
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct TrainSkinningArgs {
+    /// The data set (`effigy dataset make --preset prior`)
+    #[arg(long, value_name = "DIR")]
+    pub(crate) data: PathBuf,
+    /// The file to write; a checkpoint beside it lets the run resume
+    #[arg(long)]
+    pub(crate) out: PathBuf,
+    /// The networks' size; `paper` is only counted
+    #[arg(long, value_enum, default_value = "live")]
+    pub(crate) preset: TrainPreset,
+    /// Which clouds, and how the networks start
+    #[arg(long, default_value_t = 1)]
+    pub(crate) seed: u64,
+    /// Instead of the preset's number of steps
+    #[arg(long)]
+    pub(crate) steps: Option<u32>,
+    /// Settings of the training (TOML); what it does not name keeps the preset's
+    #[arg(long, value_name = "FILE")]
+    pub(crate) config: Option<PathBuf>,
+    /// Go on from the checkpoint beside the output
+    #[arg(long)]
+    pub(crate) resume: bool,
 }
 
 #[derive(Debug, Args)]
@@ -453,6 +483,27 @@ pub(crate) enum Protocol {
 pub(crate) enum EvaluateWhat {
     /// How well bodies are found and followed: simulated people that nothing was tuned on
     Tracking(EvaluateTrackingArgs),
+    /// How far from their true places points of test people land in star pose
+    Skinning(EvaluateSkinningArgs),
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct EvaluateSkinningArgs {
+    /// The data set (`effigy dataset make --preset cape-like`)
+    #[arg(long, value_name = "DIR")]
+    pub(crate) data: PathBuf,
+    /// The networks to measure (`effigy train skinning`)
+    #[arg(long, value_name = "FILE")]
+    pub(crate) networks: PathBuf,
+    /// Write all figures here
+    #[arg(long, value_name = "FILE")]
+    pub(crate) json: Option<PathBuf>,
+    /// Write the table here
+    #[arg(long, value_name = "FILE")]
+    pub(crate) md: Option<PathBuf>,
+    /// Frames of each sequence
+    #[arg(long, default_value_t = 4)]
+    pub(crate) frames: usize,
 }
 
 #[derive(Debug, Args)]

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use crate::{hyper::HyperConfig, sdf::loss::LossTerms};
+use crate::{hyper::HyperConfig, sdf::loss::LossTerms, skinning::network::NetworkConfig};
 
 #[derive(Debug, thiserror::Error)]
 pub enum AvatarError {
@@ -76,4 +76,21 @@ pub enum AvatarError {
     KeyframeNotFinite { keyframe: usize },
     #[error("the loss is not finite at step {step} ({terms:?}); lower the rates")]
     LossNotFinite { step: u32, terms: LossTerms },
+    #[error(
+        "the losses of the skinning networks are not finite at step {step} ({losses:?}); \
+         go on from the checkpoint with a lower rate"
+    )]
+    SkinningLossNotFinite { step: u32, losses: [f64; 3] },
+    #[error(
+        "{path}: the skinning networks were trained with body {found}, this run uses body {expected}; \
+         choose the closest body point instead, or train networks with this body"
+    )]
+    SkinningOtherBody { path: PathBuf, found: String, expected: String },
+    #[error("skinning network file asks for {config:?}, which is beyond what we load")]
+    SkinningTooLarge { config: NetworkConfig },
+    #[error(
+        "skinning network file holds {config:?}, which sees or says something else than this program's networks; \
+         train them again with this program"
+    )]
+    SkinningUnknown { config: NetworkConfig },
 }

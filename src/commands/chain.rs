@@ -145,7 +145,7 @@ pub(crate) fn report_of(
         &mut report,
         &log,
         &body,
-        avatar.avatar(),
+        (avatar.avatar(), &settings.canonicalise),
         input.truth.as_ref(),
     )?;
     report.seconds_total = clock.secs();

@@ -4,8 +4,7 @@ use std::sync::Arc;
 
 use anyhow::Context as _;
 use effigy_avatar::{
-    Avatar, DriveConfig, Driver, extract_posed, metrics,
-    skinning::{ClosestBodyPoint, ClosestBodyPointConfig},
+    Avatar, CanonicaliseConfig, DriveConfig, Driver, extract_posed, metrics, skinning::Skinning,
 };
 use effigy_capture::Rigid3;
 use effigy_fusion::{TriangleMesh, mesh::normals::vertex_normals};
@@ -33,7 +32,7 @@ pub(crate) fn evaluate(
     report: &mut Report,
     log: &RunLog,
     body: &Arc<BodyModel>,
-    avatar: Option<&Arc<Avatar>>,
+    (avatar, canonicalise): (Option<&Arc<Avatar>>, &CanonicaliseConfig),
     truth: Option<&Truth>,
 ) -> anyhow::Result<()> {
     let unseen: Vec<&TrackedSample> = log.unseen().collect();
@@ -56,7 +55,10 @@ pub(crate) fn evaluate(
         let tracked = judge.scores(Poses::Tracked, &bare_mesh)?;
         report.bare_body_tracked = Some(tracked.with_observed(bare.observed_mm));
         if let Some(avatar) = avatar {
-            let surface = FullSurface::new(avatar, body);
+            let surface = FullSurface {
+                avatar,
+                skinning: canonicalise.skinning_of(body, &avatar.subject.betas)?,
+            };
             let avatar_mesh = |params: &BodyParams| surface.posed(params);
             report.avatar = Some(judge.scores(Poses::True, &avatar_mesh)?);
             report.avatar_tracked = Some(judge.scores(Poses::Tracked, &avatar_mesh)?);
@@ -211,18 +213,13 @@ impl Judge<'_> {
 /// The avatar extracted at full resolution for each pose.
 struct FullSurface<'a> {
     avatar: &'a Avatar,
-    skinning: ClosestBodyPoint,
+    /// As the avatar's own.
+    skinning: Arc<dyn Skinning>,
 }
 
-impl<'a> FullSurface<'a> {
-    fn new(avatar: &'a Avatar, body: &Arc<BodyModel>) -> Self {
-        let config = ClosestBodyPointConfig::default();
-        let skinning = ClosestBodyPoint::new(Arc::clone(body), &avatar.subject.betas, config);
-        Self { avatar, skinning }
-    }
-
+impl FullSurface<'_> {
     fn posed(&self, params: &BodyParams) -> TriangleMesh {
-        extract_posed(self.avatar, &self.skinning, params, RESOLUTION)
+        extract_posed(self.avatar, &*self.skinning, params, RESOLUTION)
     }
 }
 

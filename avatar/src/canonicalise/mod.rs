@@ -6,7 +6,7 @@ mod free_space;
 mod snippet;
 mod unpose;
 
-use std::sync::Arc;
+use std::{path::PathBuf, sync::Arc};
 
 use effigy_capture::CameraModel;
 use effigy_fusion::{CleanFrame, maps::Rays};
@@ -19,11 +19,25 @@ use crate::{
     error::AvatarError,
     model::Subject,
     samples::CanonicalSamples,
-    skinning::{ClosestBodyPoint, ClosestBodyPointConfig, Skinning, Warp},
+    skinning::{
+        ClosestBodyPoint, ClosestBodyPointConfig, NetworkSkinning, Skinning, SkinningNetworks, Warp,
+    },
 };
 use contact::Contacts;
 pub use snippet::SnippetConfig;
 use unpose::Unposer;
+pub use unpose::canonical_places;
+
+/// What gives points their bone weights.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum SkinningChoice {
+    /// No training: the closest point of the minimal body.
+    #[default]
+    ClosestBodyPoint,
+    /// Networks in a file that `effigy train skinning` wrote.
+    Network(PathBuf),
+}
 
 /// Which points are taken from a frame, and which of them are believed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -56,7 +70,8 @@ pub struct CanonicaliseConfig {
     pub beside_outline_px: [u32; 2],
     /// How a keyframe's neighbours in time are averaged with it, where there are any.
     pub snippet: SnippetConfig,
-    pub skinning: ClosestBodyPointConfig,
+    pub skinning: SkinningChoice,
+    pub closest_body_point: ClosestBodyPointConfig,
     pub seed: u64,
 }
 
@@ -76,9 +91,27 @@ impl Default for CanonicaliseConfig {
             max_free_distance_to_body_m: 0.06,
             beside_outline_px: [3, 14],
             snippet: SnippetConfig::default(),
-            skinning: ClosestBodyPointConfig::default(),
+            skinning: SkinningChoice::default(),
+            closest_body_point: ClosestBodyPointConfig::default(),
             seed: 0,
         }
+    }
+}
+
+impl CanonicaliseConfig {
+    /// The chosen skinning for one person. Networks that were trained with another body are refused.
+    pub fn skinning_of(
+        &self,
+        model: &Arc<BodyModel>,
+        betas: &[f32; 10],
+    ) -> Result<Arc<dyn Skinning>, AvatarError> {
+        let closest =
+            ClosestBodyPoint::new(Arc::clone(model), betas, self.closest_body_point.clone());
+        let SkinningChoice::Network(path) = &self.skinning else {
+            return Ok(Arc::new(closest));
+        };
+        let networks = SkinningNetworks::load(path, model.identity)?;
+        Ok(Arc::new(NetworkSkinning::new(Arc::new(networks), closest)))
     }
 }
 
@@ -113,14 +146,14 @@ struct Observed {
 }
 
 impl Canonicaliser {
-    /// With skinning by the closest body point.
+    /// With the skinning that the configuration chooses.
     pub fn new(
         model: Arc<BodyModel>,
         betas: &[f32; 10],
         config: CanonicaliseConfig,
     ) -> Result<Self, AvatarError> {
-        let skinning = ClosestBodyPoint::new(Arc::clone(&model), betas, config.skinning.clone());
-        Self::with_skinning(model, betas, Arc::new(skinning), config)
+        let skinning = config.skinning_of(&model, betas)?;
+        Self::with_skinning(model, betas, skinning, config)
     }
 
     pub fn with_skinning(

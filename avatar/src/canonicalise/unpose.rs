@@ -9,6 +9,27 @@ use crate::skinning::{BoneWeights, SkinnedPoint, Skinning, Warp, transform_norma
 /// A point that both ways agree on to this is not moved any more: far below the sensor's noise.
 const AGREED_M: f32 = 1e-4;
 
+/// Where posed points lie in canonical space: by inverse skinning, then by rounds of correction with forward skinning.
+pub fn canonical_places(
+    skinning: &dyn Skinning,
+    (posed, warp): (&PosedBody, &Warp),
+    points: &[Vec3],
+    normals: &[Vec3],
+    refine_steps: usize,
+) -> Vec<Vec3> {
+    if refine_steps == 0 {
+        let skinned = skinning.inverse(posed, points, normals);
+        let place = |(skinned, &point): (&SkinnedPoint, &Vec3)| {
+            warp.canonical_from_posed(&skinned.weights)
+                .transform_point3(point)
+        };
+        return skinned.iter().zip(points).map(place).collect();
+    }
+    let unposer = Unposer { skinning, posed, warp, refine_steps };
+    let unposed = unposer.unpose(points, normals, f32::INFINITY);
+    unposed.iter().map(|point| point.canonical).collect()
+}
+
 /// One frame's body, and how points around it lose its pose.
 pub(super) struct Unposer<'a> {
     pub(super) skinning: &'a dyn Skinning,
@@ -54,10 +75,15 @@ impl Unposer<'_> {
         let mut open: Vec<usize> = (0..points.len())
             .filter(|&index| unposed[index].distance_to_body_m <= max_distance_m)
             .collect();
+        let asked_again = self.skinning.looks_around().then(|| open.clone());
+        let mut is_open = vec![true; points.len()];
         for round in 0..=self.refine_steps {
             let forward = self.forward(&unposed, &open, normals.is_empty());
             let mut still_open = Vec::new();
             for (&index, skinned) in open.iter().zip(&forward) {
+                if !is_open[index] {
+                    continue;
+                }
                 let point = &mut unposed[index];
                 let back = self.warp.posed_from_canonical(&skinned.weights);
                 point.miss_m = back
@@ -71,9 +97,14 @@ impl Unposer<'_> {
                         ..self.place(points[index], normal, &skinned.weights)
                     };
                     still_open.push(index);
+                } else {
+                    is_open[index] = false;
                 }
             }
-            open = still_open;
+            if still_open.is_empty() {
+                break;
+            }
+            open = asked_again.clone().unwrap_or(still_open);
         }
         unposed
     }

@@ -3,12 +3,20 @@
 //! Matrices are row-major `f32` slices; a batch has one row an element. Nothing here starts a thread.
 
 pub(crate) mod adam;
+pub(crate) mod convolution;
+pub(crate) mod dense;
 pub(crate) mod field_mlp;
+#[cfg(test)]
+mod gradient_tests;
+pub(crate) mod group_norm;
 pub(crate) mod layer_norm;
+pub(crate) mod layout;
 pub(crate) mod linear;
 pub(crate) mod matmul;
+pub(crate) mod residual;
 pub(crate) mod simd;
 pub mod threads;
+pub(crate) mod unet;
 
 pub use adam::{AdamConfig, AdamStep};
 pub use threads::{Threads, ThreadsConfig};

@@ -40,9 +40,12 @@ const SMOOTHING_LEVELS: usize = 4;
 
 /// Skinning by the closest point of one person's minimal body.
 pub struct ClosestBodyPoint {
-    model: Arc<BodyModel>,
-    config: ClosestBodyPointConfig,
-    star_body: OrientedBvh,
+    pub(super) model: Arc<BodyModel>,
+    pub(super) config: ClosestBodyPointConfig,
+    rest_joints: [Vec3; JOINT_COUNT],
+    /// Vertices of the minimal body in star pose.
+    pub(super) star: Vec<Vec3>,
+    pub(super) star_body: OrientedBvh,
     /// Weights of the body's vertices, from unsmoothed to smoothed over `full_smoothing_m`.
     levels: Vec<Vec<BoneWeights>>,
 }
@@ -50,10 +53,22 @@ pub struct ClosestBodyPoint {
 impl ClosestBodyPoint {
     pub fn new(model: Arc<BodyModel>, betas: &[f32; 10], config: ClosestBodyPointConfig) -> Self {
         let star = star_body(&model, betas);
+        let rest_joints = model.joints(&model.shaped_vertices(betas));
         let star_normals = vertex_normals(&star, &model.triangles);
         let levels = smoothing_levels(&model, &star, config.full_smoothing_m);
         let star_body = OrientedBvh::new(&star, &star_normals, &model.triangles);
-        Self { model, config, star_body, levels }
+        Self { model, config, rest_joints, star, star_body, levels }
+    }
+
+    /// Zero-pose joints of this person's minimal body.
+    pub(super) fn rest_joints(&self) -> [Vec3; JOINT_COUNT] {
+        self.rest_joints
+    }
+
+    /// The tree over this model's body in a pose.
+    pub(super) fn posed_tree(&self, posed: &PosedBody) -> OrientedBvh {
+        let normals = vertex_normals(&posed.vertices, &self.model.triangles);
+        OrientedBvh::new(&posed.vertices, &normals, &self.model.triangles)
     }
 
     fn skin(&self, body: &OrientedBvh, points: &[Vec3], normals: &[Vec3]) -> Vec<SkinnedPoint> {
@@ -69,7 +84,7 @@ impl ClosestBodyPoint {
             .collect()
     }
 
-    fn weights_at(&self, hit: &OrientedHit) -> BoneWeights {
+    pub(super) fn weights_at(&self, hit: &OrientedHit) -> BoneWeights {
         let last = self.levels.len() - 1;
         let level = hit.distance_m / self.config.full_smoothing_m.max(1e-6) * last as f32;
         let lower = (level as usize).min(last.saturating_sub(1));
@@ -90,9 +105,7 @@ impl ClosestBodyPoint {
 
 impl Skinning for ClosestBodyPoint {
     fn inverse(&self, posed: &PosedBody, points: &[Vec3], normals: &[Vec3]) -> Vec<SkinnedPoint> {
-        let body_normals = vertex_normals(&posed.vertices, &self.model.triangles);
-        let body = OrientedBvh::new(&posed.vertices, &body_normals, &self.model.triangles);
-        self.skin(&body, points, normals)
+        self.skin(&self.posed_tree(posed), points, normals)
     }
 
     fn forward(&self, points_in_canonical: &[Vec3], normals: &[Vec3]) -> Vec<SkinnedPoint> {

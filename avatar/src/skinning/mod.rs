@@ -5,6 +5,7 @@
 //! `x_posed = (sum w B) (sum w V)^-1 x_star + t`.
 
 mod closest_body_point;
+pub mod network;
 mod oriented_bvh;
 mod warp;
 
@@ -19,6 +20,7 @@ use crate::neighbors::Neighbors;
 
 pub(crate) use closest_body_point::star_body;
 pub use closest_body_point::{ClosestBodyPoint, ClosestBodyPointConfig};
+pub use network::{NetworkSkinning, SkinningNetworks};
 pub use warp::Warp;
 pub(crate) use warp::{rest_from_canonical, transform_normal};
 
@@ -41,6 +43,11 @@ pub trait Skinning: Send + Sync {
 
     /// Weights of points in canonical space.
     fn forward(&self, points_in_canonical: &[Vec3], normals: &[Vec3]) -> Vec<SkinnedPoint>;
+
+    /// Whether a point's weights depend on the points around it: then a cloud must not be asked about in parts.
+    fn looks_around(&self) -> bool {
+        false
+    }
 }
 
 /// Toes and fingers ride on ankles and wrists (seed-systems.md 1.9, step 7): depth cannot see them turn.

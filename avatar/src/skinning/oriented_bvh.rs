@@ -20,6 +20,10 @@ pub(super) struct OrientedHit {
     pub(super) vertices: [u32; 3],
     pub(super) barycentric: [f32; 3],
     pub(super) distance_m: f32,
+    /// From the mesh to the point.
+    pub(super) offset: Vec3,
+    /// The mesh's unit normal there.
+    pub(super) normal: Vec3,
 }
 
 #[derive(Clone, Copy)]
@@ -58,8 +62,7 @@ impl OrientedBvh {
     /// Minimises `distance^2 + penalty^2`, where the penalty grows from zero at agreeing normals to
     /// `opposed_m` at opposite ones. A zero normal asks for the plain closest point.
     pub(super) fn closest(&self, point: Vec3, normal: Vec3, opposed_m: f32) -> OrientedHit {
-        let mut best =
-            OrientedHit { vertices: [0; 3], barycentric: [1.0, 0.0, 0.0], distance_m: 0.0 };
+        let mut best = None;
         let mut best_cost = f32::INFINITY;
         let mut stack = [(0_u32, 0.0_f32); 64];
         let mut depth = 1;
@@ -72,9 +75,9 @@ impl OrientedBvh {
             let node = self.nodes[index as usize];
             if node.count > 0 {
                 for triangle in &self.triangles[node.first as usize..][..node.count as usize] {
-                    let (cost, hit) = triangle.cost(point, normal, opposed_m);
+                    let (cost, barycentric) = triangle.cost(point, normal, opposed_m);
                     if cost < best_cost {
-                        (best_cost, best) = (cost, hit);
+                        (best_cost, best) = (cost, Some((triangle, barycentric)));
                     }
                 }
                 continue;
@@ -88,7 +91,9 @@ impl OrientedBvh {
                 depth += 1;
             }
         }
-        best
+        best.map_or_else(OrientedHit::nowhere, |(triangle, barycentric)| {
+            triangle.hit(point, barycentric)
+        })
     }
 
     /// Median split along the longest side; `first` is the index of `triangles[0]` in leaf order.
@@ -142,7 +147,7 @@ impl Triangle {
         self.corners[0] + self.corners[1] + self.corners[2]
     }
 
-    fn cost(&self, point: Vec3, normal: Vec3, opposed_m: f32) -> (f32, OrientedHit) {
+    fn cost(&self, point: Vec3, normal: Vec3, opposed_m: f32) -> (f32, [f32; 3]) {
         let barycentric = closest_barycentric(point, &self.corners);
         let squared = point.distance_squared(mix(&self.corners, barycentric));
         let mut cost = squared;
@@ -151,11 +156,31 @@ impl Triangle {
             let disagreement = (AGREEING_COSINE - facing).max(0.0) / (1.0 + AGREEING_COSINE);
             cost += opposed_m * opposed_m * disagreement;
         }
-        let distance_m = squared.sqrt();
-        (
-            cost,
-            OrientedHit { vertices: self.vertices, barycentric, distance_m },
-        )
+        (cost, barycentric)
+    }
+
+    fn hit(&self, point: Vec3, barycentric: [f32; 3]) -> OrientedHit {
+        let offset = point - mix(&self.corners, barycentric);
+        OrientedHit {
+            vertices: self.vertices,
+            barycentric,
+            distance_m: offset.length(),
+            offset,
+            normal: mix(&self.normals, barycentric).normalize_or_zero(),
+        }
+    }
+}
+
+impl OrientedHit {
+    /// On a mesh without triangles.
+    fn nowhere() -> Self {
+        Self {
+            vertices: [0; 3],
+            barycentric: [1.0, 0.0, 0.0],
+            distance_m: 0.0,
+            offset: Vec3::ZERO,
+            normal: Vec3::ZERO,
+        }
     }
 }
 
@@ -247,10 +272,10 @@ mod tests {
             let (_, expected) = bvh
                 .triangles
                 .iter()
-                .map(|triangle| triangle.cost(point, normal, 0.3))
+                .map(|triangle| (triangle.cost(point, normal, 0.3).0, triangle.vertices))
                 .min_by(|a, b| a.0.total_cmp(&b.0))
                 .unwrap();
-            assert_eq!(found.vertices, expected.vertices);
+            assert_eq!(found.vertices, expected);
         }
     }
 

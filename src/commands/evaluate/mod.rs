@@ -1,6 +1,7 @@
 //! `effigy evaluate`: how good a part of the program is, on a fixed suite, as one file of numbers.
 
 pub(crate) mod avatar;
+mod skinning;
 pub(crate) mod tracking;
 
 use anyhow::bail;
@@ -23,6 +24,7 @@ const SCHEMA: &str = "effigy.evaluate.tracking/1";
 pub(crate) fn run(args: &EvaluateArgs) -> anyhow::Result<()> {
     match (&args.what, &args.avatar.data, args.avatar.protocol) {
         (Some(EvaluateWhat::Tracking(args)), _, _) => evaluate_tracking(args),
+        (Some(EvaluateWhat::Skinning(args)), _, _) => skinning::run(args),
         (None, Some(data), Protocol::Metavatar) => avatar::run(&args.avatar, data),
         (None, None, Protocol::Metavatar) => {
             bail!("name the data set with --data, or a suite: `effigy evaluate tracking`")

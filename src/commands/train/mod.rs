@@ -1,10 +1,12 @@
-//! `effigy train`: how the shipped prior is made.
+//! `effigy train`: how the shipped networks are made.
 
+mod clouds;
 mod curve;
 mod estimate;
 mod held_out;
 mod people;
 mod report;
+mod skinning;
 
 use std::{fs, path::Path, sync::Arc};
 
@@ -31,6 +33,7 @@ pub(crate) fn run(args: &TrainArgs) -> anyhow::Result<()> {
     match &args.what {
         TrainWhat::Sdf(args) => field(args),
         TrainWhat::Hyper(args) => hyper(args),
+        TrainWhat::Skinning(args) => skinning::run(args),
     }
 }
 

@@ -19,6 +19,7 @@ use std::path::Path;
 use effigy_registration::smpl::builtin;
 use effigy_sim_sensor::dataset::Dataset;
 
+pub(super) use self::views::{protocol_calibration, protocol_frame};
 use self::{
     judge::judge,
     method::{Given, fit},

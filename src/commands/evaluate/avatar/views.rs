@@ -154,7 +154,18 @@ impl Lesson<'_> {
     }
 }
 
-fn protocol_calibration() -> Calibration {
+/// Raw depth of MetaAvatar's camera as a frame.
+pub(in crate::commands::evaluate) fn protocol_frame(
+    raw: Vec<u16>,
+    id: FrameId,
+    timestamp: Timestamp,
+) -> anyhow::Result<Frame> {
+    let (camera, _) = protocol_camera();
+    let depth = Arc::new(DepthImage::new(camera.width, camera.height, raw)?);
+    Ok(Frame { id, timestamp, depth, color: None })
+}
+
+pub(in crate::commands::evaluate) fn protocol_calibration() -> Calibration {
     let (intrinsics, _) = protocol_camera();
     Calibration {
         sensor_name: "MetaAvatar's protocol".to_owned(),
