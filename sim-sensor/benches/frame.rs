@@ -1,10 +1,15 @@
-//! What a simulated frame costs: dressing and posing, drawing, exposing.
+//! What a simulated frame costs: dressing and posing, drawing, exposing; and simulating cloth.
+
+use std::sync::Arc;
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use effigy_capture::{FrameId, FrameSource as _};
-use effigy_registration::smpl::builtin;
+use effigy_registration::{motion::Routine, smpl::builtin};
 use effigy_sim_sensor::{
-    OutfitKind, Room, Scenario, SensorPreset, SimulatedSensor, Truth, noise::Exposure,
+    Outfit, OutfitKind, Person, Room, Scenario, SensorPreset, SimulatedSensor, Truth,
+    cloth::{ClothConfig, ClothKind, Wear},
+    noise::Exposure,
+    person::sample_betas,
     render::Renderer,
 };
 
@@ -46,5 +51,32 @@ fn frame(criterion: &mut Criterion) {
     }
 }
 
-criterion_group!(benches, frame);
+/// One frame of a fully dressed person at 30 Hz, the body's posing included; the bar is 350 ms on one core.
+fn cloth(criterion: &mut Criterion) {
+    let body = builtin::body();
+    let betas = sample_betas(&body, 1);
+    let person = Arc::new(Person::new(body, betas, Outfit::UNDER, 1));
+    let motion = Routine::WalkInPlace.motion(&person.rest_body(), 30.0, 1);
+    let mut group = criterion.benchmark_group("cloth");
+    group.sample_size(20);
+    for kind in [
+        ClothKind::Dress,
+        ClothKind::TshirtTrousers,
+        ClothKind::BlazerTrousers,
+    ] {
+        let mut wear = Wear::new(Arc::clone(&person), kind, 0.8, 1, ClothConfig::default());
+        wear.start(&motion.poses[0]);
+        let mut poses = motion.poses.iter().cycle();
+        group.bench_function(kind.name(), |b| {
+            b.iter(|| {
+                if let Some(pose) = poses.next() {
+                    wear.step(pose, 1.0 / 30.0);
+                }
+            });
+        });
+    }
+    group.finish();
+}
+
+criterion_group!(benches, frame, cloth);
 criterion_main!(benches);

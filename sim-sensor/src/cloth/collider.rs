@@ -5,6 +5,9 @@ use glam::Vec3;
 
 use super::sheet::{NONE, Sheet};
 
+/// How far around a point surfaces are looked for: deeper than cloth ever gets between two looks.
+pub(super) const REACH_M: f32 = 0.035;
+
 /// A triangle mesh at the end of a step, and where it was at the step's start.
 #[derive(Clone, Debug)]
 pub(super) struct Collider {
@@ -33,6 +36,26 @@ pub(super) struct Touch {
     pub(super) barycentric: Vec3,
     /// Whether the surface ends here, so that nothing is inside or outside.
     pub(super) on_rim: bool,
+}
+
+/// What a garment touches: how near it may come to each surface.
+pub(super) struct Obstacle<'a> {
+    pub(super) collider: &'a Collider,
+    pub(super) thickness_m: f32,
+    /// What is further inside than this is left alone: thin cloth has an inside for no more than that.
+    pub(super) deepest_m: f32,
+    /// The furthest a point is pushed out in one step.
+    pub(super) push_m: f32,
+}
+
+impl<'a> Obstacle<'a> {
+    pub(super) fn body(collider: &'a Collider, thickness_m: f32) -> Self {
+        Self { collider, thickness_m, deepest_m: REACH_M, push_m: REACH_M }
+    }
+
+    pub(super) fn layer(collider: &'a Collider, thickness_m: f32) -> Self {
+        Self { collider, thickness_m, deepest_m: 0.010, push_m: 0.001 }
+    }
 }
 
 impl Collider {

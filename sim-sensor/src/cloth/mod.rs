@@ -6,9 +6,13 @@
 
 mod collider;
 mod cut;
+mod dyes;
 mod envelope;
 mod form;
+mod hang;
+mod hold;
 mod measure;
+mod opening;
 mod pattern;
 mod remesh;
 mod sew;
@@ -18,6 +22,8 @@ mod tape;
 mod wear;
 mod weights;
 
+#[cfg(test)]
+mod physics_tests;
 #[cfg(test)]
 mod tests;
 

@@ -1,5 +1,6 @@
 //! What a garment is, as a tailor would write it down, and the outfits made of them.
 
+use super::dyes::{DRESSES, HOODIES, SHIRTS, SUITS, TROUSERS, WHITE};
 use crate::{person::Material, random::Randomness};
 
 /// One garment. Stations along limbs: arms 0 shoulder, 1 elbow, 2 wrist; legs 0 hip, 1 knee, 2 ankle.
@@ -74,7 +75,8 @@ const JERSEY: Fabric =
 const FLEECE: Fabric = Fabric { bend_compliance: 5.0e-5, ..JERSEY };
 const TWILL: Fabric =
     Fabric { stretch_compliance: 3.0e-8, bend_compliance: 8.0e-5, friction: 0.12, drag: 2.0 };
-const SUITING: Fabric = Fabric { bend_compliance: 3.0e-5, friction: 0.15, ..TWILL };
+/// Lined: it slides over a shirt.
+const SUITING: Fabric = Fabric { bend_compliance: 3.0e-5, friction: 0.1, ..TWILL };
 const CREPE: Fabric = Fabric { bend_compliance: 6.0e-4, friction: 0.15, drag: 3.0, ..JERSEY };
 
 /// Clothes by name, to be simulated.
@@ -138,8 +140,8 @@ impl ClothKind {
             Self::PoloTrousers => vec![tailor.slim_trousers(), tailor.polo()],
             Self::HoodieTrousers => vec![tailor.slim_trousers(), tailor.hoodie()],
             Self::BlazerTrousers => {
-                let close = Tailor { fit: 0.45, ..tailor };
-                vec![close.undershirt(), tailor.slim_trousers(), tailor.blazer()]
+                let close = Tailor { fit: 0.6, ..tailor };
+                vec![close.undershirt(), tailor.suit_trousers(), tailor.blazer()]
             }
             Self::Skirt => {
                 let close = Tailor { fit: 0.3 + 0.4 * fit, ..tailor };
@@ -163,37 +165,6 @@ struct Tailor {
     fit: f32,
     random: Randomness,
 }
-
-const WHITE: Material = Material { color: [226, 222, 212], reflectance: 0.85 };
-const SHIRTS: [Material; 5] = [
-    Material { color: [62, 104, 160], reflectance: 0.60 },
-    Material { color: [178, 66, 62], reflectance: 0.65 },
-    WHITE,
-    Material { color: [72, 132, 104], reflectance: 0.60 },
-    Material { color: [206, 164, 72], reflectance: 0.70 },
-];
-const HOODIES: [Material; 3] = [
-    Material { color: [120, 124, 132], reflectance: 0.55 },
-    Material { color: [146, 62, 74], reflectance: 0.60 },
-    Material { color: [74, 96, 88], reflectance: 0.50 },
-];
-const TROUSERS: [Material; 4] = [
-    Material { color: [68, 78, 108], reflectance: 0.50 },
-    Material { color: [142, 128, 104], reflectance: 0.60 },
-    Material { color: [84, 86, 90], reflectance: 0.40 },
-    Material { color: [58, 62, 78], reflectance: 0.45 },
-];
-const SUITS: [Material; 3] = [
-    Material { color: [58, 66, 92], reflectance: 0.40 },
-    Material { color: [112, 104, 96], reflectance: 0.45 },
-    Material { color: [70, 72, 76], reflectance: 0.35 },
-];
-const DRESSES: [Material; 4] = [
-    Material { color: [156, 52, 84], reflectance: 0.60 },
-    Material { color: [52, 112, 124], reflectance: 0.55 },
-    Material { color: [196, 138, 92], reflectance: 0.65 },
-    Material { color: [98, 84, 142], reflectance: 0.55 },
-];
 
 impl Tailor {
     /// From tight to loose, by the size.
@@ -232,10 +203,11 @@ impl Tailor {
         Pattern { name: "T-shirt, tucked in", hem: None, ..shirt }
     }
 
+    /// Held by the neck and the belt, it has to give where arms go up: wide, and cut off above the sleeve's bend.
     fn undershirt(&self) -> Pattern {
         let mut shirt = self.tucked_in();
         shirt.name = "shirt under a blazer";
-        shirt.limbs = Limbs::Arms { end: 0.5 };
+        shirt.limbs = Limbs::Arms { end: 0.35 };
         shirt.material = WHITE;
         shirt
     }
@@ -321,6 +293,20 @@ impl Tailor {
             },
             fabric: TWILL,
             material: self.of(&TROUSERS, 10),
+        }
+    }
+
+    fn suit_trousers(&self) -> Pattern {
+        let trousers = self.slim_trousers();
+        Pattern {
+            name: "suit trousers",
+            ease: Ease {
+                trunk_m: self.by_fit(0.010, 0.018),
+                limb_m: self.by_fit(0.018, 0.034),
+                end_m: self.by_fit(0.018, 0.036),
+                ..trousers.ease
+            },
+            ..trousers
         }
     }
 

@@ -2,11 +2,14 @@
 
 use effigy_fusion::mesh::closest_point::ClosestPoint;
 use effigy_registration::smpl::VertexWeights;
-use glam::{Vec3, vec2};
+use glam::Vec3;
 
 use super::{
     cut::{clipped_by, covered, seam_height_m, tucked_hem_m},
     form::Form,
+    hang::with_hanging_part,
+    hold::{Held, held},
+    opening::{add_folded_collar, front_gap},
     pattern::{Front, Limbs, Pattern, Top},
     remesh::remeshed,
     sheet::{NONE, Sheet},
@@ -24,16 +27,6 @@ const SHAPING: usize = 12;
 const HOOD_SHAPING: usize = 60;
 /// Room between a leg's cloth and the body's middle plane.
 const MIDLINE_GAP_M: f32 = 0.004;
-/// Cloth this close below the waist is held by the belt.
-const BELT_M: f32 = 0.028;
-/// Belts give a little; so does what keeps a shirt in its place on the neck and shoulders.
-const BELT_COMPLIANCE: f32 = 1e-4;
-const NECK_COMPLIANCE: f32 = 3e-4;
-/// How far the seam of the neck and shoulders reaches from the neck's joint.
-const NECK_SEAM_M: f32 = 0.09;
-const RIB_M: f32 = 0.06;
-/// Half the gap between the free front edges: at the buttons and at the collar.
-const FRONT_GAP_M: [f32; 2] = [0.012, 0.075];
 
 /// A garment cut to one person, in the pose it was cut in.
 #[derive(Clone, Debug)]
@@ -48,17 +41,6 @@ pub struct Garment {
     /// The body's vertex nearest to each point when it was cut.
     pub home: Vec<u32>,
     pub(super) held: Vec<Held>,
-}
-
-/// A point of a garment that is held in its place by a belt or a seam.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Held {
-    pub(super) point: u32,
-    /// Its place in the zero pose, and the bones of the trunk that move it.
-    pub(super) at_rest: Vec3,
-    pub(super) weights: VertexWeights,
-    /// For unit mass, in seconds squared.
-    pub(super) compliance: f32,
 }
 
 /// Cuts and sews one garment on its form, over the others on theirs, and lays it out on the form on which
@@ -232,195 +214,4 @@ fn ease_m(pattern: &Pattern, place: &Place, point: Vec3, form: &Form) -> f32 {
         }
     }
     ease_m.max(CLOSEST_M)
-}
-
-/// Hangs rows of cloth from the lowest border: around both legs, never narrower than above.
-fn with_hanging_part(sheet: &Sheet, form: &Form, pattern: &Pattern, hem_m: f32) -> Sheet {
-    let mut sheet = sheet.clone();
-    let loops = sheet.border_loops();
-    let mean_y = |around: &Vec<u32>| {
-        around
-            .iter()
-            .map(|&v| sheet.points[v as usize].y)
-            .sum::<f32>()
-            / around.len() as f32
-    };
-    let Some(border) = loops.iter().min_by(|a, b| mean_y(a).total_cmp(&mean_y(b))) else {
-        return sheet;
-    };
-    let top: Vec<Vec3> = border.iter().map(|&v| sheet.points[v as usize]).collect();
-    let top_m = mean_y(border);
-    let middle: Vec3 = top.iter().sum::<Vec3>() / top.len() as f32;
-    let center = vec2(middle.x, middle.z);
-    let spacing_m = perimeter_m(&top) / border.len() as f32;
-    let rows = ((top_m - hem_m) / spacing_m).round().max(1.0) as usize;
-    let directions: Vec<_> = top
-        .iter()
-        .map(|p| (vec2(p.x, p.z) - center).normalize_or_zero())
-        .collect();
-    let mut radii: Vec<f32> = top
-        .iter()
-        .map(|p| vec2(p.x, p.z).distance(center))
-        .collect();
-    let mut last = border.clone();
-    for row in 1..=rows {
-        let share = row as f32 / rows as f32;
-        let height_m = top_m + (hem_m - top_m) * share;
-        let step_m = (top_m - hem_m) / rows as f32;
-        let outline = form.outline(height_m);
-        let ribs = if pattern.ease.ribbed {
-            smoothstep(RIB_M, 0.02, height_m - hem_m)
-        } else {
-            0.0
-        };
-        for (radius, &direction) in radii.iter_mut().zip(&directions) {
-            let body_m = outline.radius_m(center, direction) + pattern.ease.hem_m;
-            let hanging_m = radius.max(body_m) + pattern.ease.flare * step_m;
-            *radius = hanging_m + (body_m - hanging_m).min(0.0) * ribs;
-        }
-        smooth_ring(&mut radii);
-        let first = sheet.points.len() as u32;
-        for (i, (&direction, &radius)) in directions.iter().zip(&radii).enumerate() {
-            let at = center + direction * radius;
-            let y = top[i].y + (hem_m - top[i].y) * share;
-            sheet.points.push(Vec3::new(at.x, y, at.y));
-        }
-        let next: Vec<u32> = (first..sheet.points.len() as u32).collect();
-        sew_rows(&mut sheet, &last, &next, true);
-        last = next;
-    }
-    sheet
-}
-
-fn perimeter_m(points: &[Vec3]) -> f32 {
-    (0..points.len())
-        .map(|i| points[i].distance(points[(i + 1) % points.len()]))
-        .sum()
-}
-
-fn smooth_ring(radii: &mut [f32]) {
-    let count = radii.len();
-    let before = radii.to_vec();
-    for (i, radius) in radii.iter_mut().enumerate() {
-        let beside = before[(i + count - 1) % count] + before[(i + 1) % count];
-        *radius = radius.max(0.5 * before[i] + 0.25 * beside);
-    }
-}
-
-/// Joins a border, in the order of its triangles, with a new row of as many points.
-fn sew_rows(sheet: &mut Sheet, border: &[u32], row: &[u32], closed: bool) {
-    let count = border.len();
-    for i in 0..if closed { count } else { count - 1 } {
-        let next = (i + 1) % count;
-        let [a, b, below_a, below_b] = [border[i], border[next], row[i], row[next]];
-        sheet.triangles.push([b, a, below_a]);
-        sheet.triangles.push([b, below_a, below_b]);
-    }
-}
-
-/// Positive beside the front opening of a jacket; `neck_m` is the neck's height over the pelvis.
-fn front_gap(from_pelvis: Vec3, neck_m: f32) -> f32 {
-    let up = from_pelvis.y / neck_m;
-    let lapel = smoothstep(0.35, 1.0, up);
-    let round = smoothstep(-0.25, -0.75, up);
-    let half_gap_m = FRONT_GAP_M[0] + (FRONT_GAP_M[1] - FRONT_GAP_M[0]) * lapel + 0.05 * round;
-    (from_pelvis.x.abs() - half_gap_m).max(0.02 - from_pelvis.z)
-}
-
-/// A collar that stands around the neck and falls over, open in front.
-fn add_folded_collar(sheet: &mut Sheet, neck: Vec3) {
-    const PROFILE_M: [(f32, f32); 4] = [
-        (0.020, 0.000),
-        (0.024, 0.009),
-        (0.010, 0.018),
-        (-0.006, 0.026),
-    ];
-    const OPEN_RAD: f32 = 0.22;
-    let highest = sheet.border_loops().into_iter().max_by(|a, b| {
-        let y = |around: &Vec<u32>| {
-            around
-                .iter()
-                .map(|&v| sheet.points[v as usize].y)
-                .sum::<f32>()
-                / around.len() as f32
-        };
-        y(a).total_cmp(&y(b))
-    });
-    let Some(around) = highest else { return };
-    let middle: Vec3 = around
-        .iter()
-        .map(|&v| sheet.points[v as usize])
-        .sum::<Vec3>()
-        / around.len() as f32;
-    let aside = |v: u32| {
-        let from = sheet.points[v as usize] - middle;
-        from.x.atan2(from.z)
-    };
-    let Some(start) = (0..around.len()).find(|&i| {
-        let before = around[(i + around.len() - 1) % around.len()];
-        aside(before).abs() < OPEN_RAD && aside(around[i]).abs() >= OPEN_RAD
-    }) else {
-        return;
-    };
-    let mut last: Vec<u32> = (0..around.len())
-        .map(|i| around[(start + i) % around.len()])
-        .take_while(|&v| aside(v).abs() >= OPEN_RAD)
-        .collect();
-    let foot: Vec<Vec3> = last.iter().map(|&v| sheet.points[v as usize]).collect();
-    for (up_m, out_m) in PROFILE_M {
-        let first = sheet.points.len() as u32;
-        for point in &foot {
-            let out = Vec3::new(point.x - middle.x, 0.0, point.z - neck.z).normalize_or_zero();
-            sheet.points.push(*point + Vec3::Y * up_m + out * out_m);
-        }
-        let row: Vec<u32> = (first..sheet.points.len() as u32).collect();
-        sew_rows(sheet, &last, &row, false);
-        last = row;
-    }
-}
-
-/// What keeps a garment on: a belt around the waist, or the seam around the neck.
-fn held(form: &Form, pattern: &Pattern, sheet: &Sheet) -> Vec<Held> {
-    let waist_m = form.leg_height_m(0.0);
-    let neck = form.joints[12];
-    const WAIST: (&[u8], f32) = (&[0, 3], BELT_COMPLIANCE);
-    const NECK: (&[u8], f32) = (&[6, 9, 12, 13, 14], NECK_COMPLIANCE);
-    let holding = |point: Vec3| match pattern.top {
-        Top::Waist { above_hips_m } => (point.y > waist_m + above_hips_m - BELT_M).then_some(WAIST),
-        Top::Collar { .. } | Top::FoldedCollar { .. } => {
-            let on_neck = point.z < neck.z + 0.02 && point.distance(neck) < NECK_SEAM_M;
-            let under_belt = pattern.is_tucked_in() && point.y < tucked_hem_m(form) + BELT_M;
-            if on_neck {
-                Some(NECK)
-            } else {
-                under_belt.then_some(WAIST)
-            }
-        }
-        Top::Hood => None,
-    };
-    let held = |(v, &point): (usize, &Vec3)| {
-        let (bones, compliance) = holding(point)?;
-        let shares = form.bone_shares(point, false);
-        let total: f32 = bones.iter().map(|&bone| shares[bone as usize]).sum();
-        let mut weights = VertexWeights::default();
-        weights.bones[0] = bones[0];
-        weights.weights[0] = 1.0;
-        if total > 0.01 {
-            // The four strongest are enough: no point of a neck or waist has more.
-            let mut order = bones.to_vec();
-            order.sort_by(|&a, &b| shares[b as usize].total_cmp(&shares[a as usize]));
-            let kept: f32 = order
-                .iter()
-                .take(4)
-                .map(|&bone| shares[bone as usize])
-                .sum();
-            for (slot, &bone) in order.iter().take(4).enumerate() {
-                weights.bones[slot] = bone;
-                weights.weights[slot] = shares[bone as usize] / kept;
-            }
-        }
-        let at_rest = form.bones.blend(&weights).inverse().transform_point3(point);
-        Some(Held { point: v as u32, at_rest, weights, compliance })
-    };
-    sheet.points.iter().enumerate().filter_map(held).collect()
 }

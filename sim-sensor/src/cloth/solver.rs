@@ -4,16 +4,15 @@
 use glam::Vec3;
 
 use super::{
-    collider::{Collider, Touch},
-    sew::{Garment, Held},
+    collider::{Obstacle, REACH_M, Touch},
+    hold::Held,
+    sew::Garment,
     sheet::{Edge, NONE},
 };
 
 const GRAVITY: Vec3 = Vec3::new(0.0, -9.81, 0.0);
 /// Nothing in a wardrobe is faster.
 const MAX_SPEED_M_S: f32 = 12.0;
-/// How far around a point surfaces are looked for: deeper than cloth ever gets between two looks.
-const REACH_M: f32 = 0.035;
 /// Contacts are kept ready this far beyond touching.
 const MARGIN_M: f32 = 0.004;
 /// Cloth on cloth moves along with it, by this share in each step.
@@ -89,26 +88,6 @@ struct Contact {
     obstacle: usize,
     triangle: u32,
     barycentric: Vec3,
-}
-
-/// What a garment touches: how near it may come to each surface.
-pub(super) struct Obstacle<'a> {
-    pub(super) collider: &'a Collider,
-    pub(super) thickness_m: f32,
-    /// What is further inside than this is left alone: thin cloth has an inside for no more than that.
-    pub(super) deepest_m: f32,
-    /// The furthest a point is pushed out in one step.
-    pub(super) push_m: f32,
-}
-
-impl<'a> Obstacle<'a> {
-    pub(super) fn body(collider: &'a Collider, thickness_m: f32) -> Self {
-        Self { collider, thickness_m, deepest_m: REACH_M, push_m: REACH_M }
-    }
-
-    pub(super) fn layer(collider: &'a Collider, thickness_m: f32) -> Self {
-        Self { collider, thickness_m, deepest_m: 0.010, push_m: 0.001 }
-    }
 }
 
 impl Cloth {

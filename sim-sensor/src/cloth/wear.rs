@@ -9,12 +9,12 @@ use effigy_registration::{
 use glam::{Quat, Vec3};
 
 use super::{
-    collider::Collider,
+    collider::{Collider, Obstacle},
     form::{Form, cut_pose},
     pattern::{ClothKind, Limbs},
     sew::{Garment, sew},
     sheet::Sheet,
-    solver::{Cloth, Obstacle},
+    solver::Cloth,
 };
 use crate::{
     person::{Person, smoothstep},
@@ -28,7 +28,7 @@ pub struct ClothConfig {
     pub step_secs: f32,
     /// The body may move this far in one step; faster movement gets more steps.
     pub step_m: f32,
-    /// Rounds over all constraints in one step.
+    /// Rounds over all constraints in one step; more than two garments get two more for each.
     pub iterations: usize,
     /// Cloth stays this far from skin, and from other cloth.
     pub skin_m: f32,
@@ -63,6 +63,8 @@ const REACTION: f32 = 0.3;
 const MAX_REACTION_M: f32 = 0.0005;
 /// How far hips and knees are bent while trousers are cut.
 const SEAT_RAD: f32 = 0.6;
+/// Further rounds for each garment beyond two: what is pressed by others takes longer to find its length again.
+const LAYER_ITERATIONS: usize = 2;
 /// Cloth is never perfectly even; the seed decides where it buckles.
 const UNEVEN_M: f32 = 0.0005;
 
@@ -307,12 +309,13 @@ impl Wear {
 
     fn step_cloths(&mut self, secs: f32) {
         let count = self.cloths.len();
+        let iterations = self.config.iterations + LAYER_ITERATIONS * count.saturating_sub(2);
         for number in 0..count {
             let mut obstacles = vec![Obstacle::body(&self.body, self.config.skin_m)];
             for inner in &self.layers[..number] {
                 obstacles.push(Obstacle::layer(inner, self.config.layer_m));
             }
-            self.cloths[number].step(secs, self.config.iterations, &obstacles);
+            self.cloths[number].step(secs, iterations, &obstacles);
             let (inner, outer) = self.cloths.split_at_mut(number);
             for (obstacle, triangle, barycentric, push) in outer[0].reactions() {
                 // The body is the first obstacle; garments follow from the innermost.
