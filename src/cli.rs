@@ -76,7 +76,7 @@ pub(crate) struct DemoArgs {
 
 #[derive(Debug, Args)]
 pub(crate) struct SceneArgs {
-    /// The simulated sensor: azure, d435, d455, oak, kinect
+    /// The simulated sensor: azure, d435, oak, kinect, d455
     #[arg(long, default_value = "azure", value_parser = named::<SensorPreset>)]
     pub(crate) sensor: SensorPreset,
     /// What the person does: mixture, turn-around, walk-in-place, raise-arms, squat, wave, stand, twist, punch, shoulder-mill, hips,

@@ -45,7 +45,7 @@ const METRES_PER_UNIT: f32 = 0.001;
 const RATE_HZ: f32 = 30.0;
 
 impl SensorPreset {
-    pub const ALL: [Self; 5] = [Self::Azure, Self::D435, Self::D455, Self::Oak, Self::Kinect];
+    pub const ALL: [Self; 5] = [Self::Azure, Self::D435, Self::Oak, Self::Kinect, Self::D455];
 
     pub fn name(self) -> &'static str {
         match self {
