@@ -3,19 +3,14 @@
 use std::sync::Arc;
 
 use effigy_capture::{
-    Calibration, CameraModel, DepthImage, Distortion, Frame, FrameId, Rigid3, SensorModel,
-    Timestamp,
+    Calibration, CameraModel, Distortion, Frame, FrameId, Rigid3, SensorModel, Timestamp,
 };
 use effigy_fusion::clean::{CleanConfig, Cleaner};
 use effigy_registration::{RegisteredFrame, Tracking};
 use effigy_sim_sensor::{
-    Room, SensorPreset,
-    dataset::{Sequence, protocol_camera},
-    noise::Exposure,
-    person::Paint,
-    render::Renderer,
+    Room,
+    dataset::{SensorShot, Sequence, protocol_camera},
 };
-use glam::Quat;
 
 use super::{moment::moment, plan::Camera, subject::Lesson};
 
@@ -98,50 +93,30 @@ impl Views {
         yaw_rad: f32,
     ) -> anyhow::Result<(Frame, Rigid3)> {
         let (depth, world_from_camera) = match self.camera {
-            Camera::Paper => sequence.protocol_depth(frame, yaw_rad),
-            Camera::Sensor(preset) => self.through(preset, sequence, (frame, yaw_rad))?,
+            Camera::Paper => {
+                let (depth, world_from_camera) = sequence.protocol_depth(frame, yaw_rad);
+                (Arc::new(depth), world_from_camera)
+            }
+            Camera::Sensor(sensor) => {
+                // Moments between the data set's frames share a number: a seed of its own gives each its own noise.
+                let seed = self.seed.wrapping_mul(1_000_003).wrapping_add(self.taken);
+                let room = Room::Floor;
+                let shot = SensorShot { sensor, room, yaw_rad, seed, ..SensorShot::default() };
+                let (seen, calibration) = sequence.sensor_frame(frame, &shot);
+                (
+                    seen.depth,
+                    calibration.world_from_camera.unwrap_or_default(),
+                )
+            }
         };
         let exposure = Frame {
             id: FrameId(self.taken),
             timestamp: Timestamp::from_secs_f64(self.taken as f64 / f64::from(RATE_HZ)),
-            depth: Arc::new(depth),
+            depth,
             color: None,
         };
         self.taken += 1;
         Ok((exposure, world_from_camera))
-    }
-
-    /// What a sensor delivers that stands as high and as far away as it always does, with its noise.
-    fn through(
-        &self,
-        preset: SensorPreset,
-        sequence: &Sequence,
-        (frame, yaw_rad): (usize, f32),
-    ) -> anyhow::Result<(DepthImage, Rigid3)> {
-        let mount = preset.calibration().world_from_camera.unwrap_or_default();
-        let mut axis = sequence.rest_joints[0] + sequence.frames[frame].trans;
-        axis.y = 0.0;
-        let turn = Quat::from_rotation_y(yaw_rad);
-        let world_from_camera = Rigid3 {
-            rotation: turn * mount.rotation,
-            translation: axis + turn * mount.translation,
-        };
-        let intrinsics = preset.intrinsics();
-        let mut renderer = Renderer::new(intrinsics, world_from_camera, Room::Floor).two_sided();
-        let paint = Paint::of_bones(
-            &sequence.weights,
-            &vec![false; sequence.weights.len()],
-            sequence
-                .plan
-                .scenario
-                .as_ref()
-                .map_or(0, |scenario| scenario.seed),
-        );
-        let view = renderer.render(&sequence.posed_mesh(frame), &paint, &sequence.weights);
-        let mut exposure = Exposure::new(&self.calibration, preset.defects());
-        let raw = exposure.expose(view, self.seed, FrameId(self.taken));
-        let image = DepthImage::new(intrinsics.width, intrinsics.height, raw)?;
-        Ok((image, world_from_camera))
     }
 }
 
