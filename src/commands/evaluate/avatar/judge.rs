@@ -23,9 +23,11 @@ pub(super) fn judge(job: &Job, outcome: &Outcome, subject: &Subject) -> anyhow::
                 looks.add(rendered_normals(&test.truth, &predicted));
             }
         }
-        let Some(mean) = sum.mean() else {
+        if subject.tests.iter().all(|test| test.task != task) {
             continue;
-        };
+        }
+        // Without a surface there is nothing to measure, which is a result.
+        let mean = sum.mean();
         let [normals_deg, fine_ratio, fine_correlation] = looks.means();
         rows.push(Row {
             table: job.table,
@@ -44,10 +46,10 @@ pub(super) fn judge(job: &Job, outcome: &Outcome, subject: &Subject) -> anyhow::
             learned_from: outcome.learned_from,
             frames: sum.frames,
             scores: Scores {
-                d_p_cm: Some(mean.d_p_cm),
-                d_f_cm: Some(mean.d_f_cm),
-                nc: Some(mean.nc),
-                p2s_mm: Some(mean.p2s_mm),
+                d_p_cm: mean.map(|mean| mean.d_p_cm),
+                d_f_cm: mean.map(|mean| mean.d_f_cm),
+                nc: mean.map(|mean| mean.nc),
+                p2s_mm: mean.map(|mean| mean.p2s_mm),
                 normals_deg,
                 fine_ratio,
                 fine_correlation,

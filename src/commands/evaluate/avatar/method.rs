@@ -4,7 +4,7 @@ use std::{ops::ControlFlow, sync::Arc};
 
 use anyhow::Context as _;
 use effigy_avatar::{
-    Avatar, CanonicalSamples, CanonicaliseConfig, Canonicaliser, PoseField, PoseInput,
+    Avatar, AvatarError, CanonicalSamples, CanonicaliseConfig, Canonicaliser, PoseField, PoseInput,
     SignedDistanceField, TopologyConfig,
     baselines::{self, Architecture, BodyLabels, ConditionedField, PoseMap},
     extract_posed,
@@ -50,7 +50,14 @@ const ABLATION_RATE: f32 = 2e-4;
 pub(super) struct Fitted {
     body: Arc<BodyModel>,
     betas: [f32; 10],
-    learned: Option<(Avatar, Canonicaliser)>,
+    surface: Surface,
+}
+
+enum Surface {
+    Body,
+    Avatar(Box<(Avatar, Canonicaliser)>),
+    /// A field without a zero level: some baselines end there.
+    Nothing,
 }
 
 impl Fitted {
@@ -59,14 +66,20 @@ impl Fitted {
         let pelvis = |betas| self.body.joints(&self.body.shaped_vertices(betas))[0];
         let trans = params.trans + pelvis(&params.betas) - pelvis(&self.betas);
         let params = BodyParams { betas: self.betas, trans, ..*params };
-        if let Some((avatar, canonicaliser)) = &self.learned {
-            let resolution = resolution(avatar, &params);
-            return extract_posed(avatar, &**canonicaliser.skinning(), &params, resolution);
+        match &self.surface {
+            Surface::Body => {
+                let vertices = self.body.pose(&params).vertices;
+                let mut mesh = TriangleMesh::new(vertices, self.body.triangles.clone());
+                mesh.compute_normals();
+                mesh
+            }
+            Surface::Avatar(learned) => {
+                let (avatar, canonicaliser) = &**learned;
+                let resolution = resolution(avatar, &params);
+                extract_posed(avatar, &**canonicaliser.skinning(), &params, resolution)
+            }
+            Surface::Nothing => TriangleMesh::default(),
         }
-        let vertices = self.body.pose(&params).vertices;
-        let mut mesh = TriangleMesh::new(vertices, self.body.triangles.clone());
-        mesh.compute_normals();
-        mesh
     }
 }
 
@@ -111,13 +124,17 @@ pub(super) fn fit(job: &Job, given: &Given<'_>) -> anyhow::Result<Outcome> {
     let betas = seen.canonicaliser.subject().betas;
     let body = Arc::clone(given.body);
     if job.method == Method::BareBody {
-        let fitted = Fitted { body, betas, learned: None };
+        let fitted = Fitted { body, betas, surface: Surface::Body };
         return Ok(Outcome { fitted, asked, learned_from, seconds: 0.0 });
     }
     let start = given.clock.secs();
     let avatar = learned(job, &seen, given)?;
     let seconds = seconds + given.clock.secs() - start;
-    let fitted = Fitted { body, betas, learned: Some((avatar, seen.canonicaliser)) };
+    let surface = match avatar {
+        Some(avatar) => Surface::Avatar(Box::new((avatar, seen.canonicaliser))),
+        None => Surface::Nothing,
+    };
+    let fitted = Fitted { body, betas, surface };
     Ok(Outcome { fitted, asked, learned_from, seconds })
 }
 
@@ -177,16 +194,22 @@ fn see(job: &Job, given: &Given<'_>) -> anyhow::Result<(Seen, f64)> {
     Ok((Seen { canonicaliser, samples, asked }, seconds))
 }
 
-fn learned(job: &Job, seen: &Seen, given: &Given<'_>) -> anyhow::Result<Avatar> {
+/// The avatar, if what was learned has a surface.
+fn learned(job: &Job, seen: &Seen, given: &Given<'_>) -> anyhow::Result<Option<Avatar>> {
     let Seen { canonicaliser, samples, .. } = seen;
     let theta = samples.first().context("no keyframe was tracked")?.theta;
-    Ok(Avatar::new(
+    let avatar = Avatar::new(
         canonicaliser.subject(),
         field(job, seen, given)?,
         &**canonicaliser.skinning(),
         &theta,
         &TopologyConfig::default(),
-    )?)
+    );
+    match avatar {
+        Ok(avatar) => Ok(Some(avatar)),
+        Err(AvatarError::NoSurface { .. }) => Ok(None),
+        Err(error) => Err(error.into()),
+    }
 }
 
 /// The field that a method learns.
