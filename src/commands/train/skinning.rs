@@ -1,6 +1,6 @@
 //! `effigy train skinning`: how the shipped skinning networks are made.
 
-use std::{fs, ops::ControlFlow, path::Path};
+use std::{fmt::Write as _, fs, ops::ControlFlow, path::Path};
 
 use anyhow::{Context as _, bail};
 use effigy_avatar::skinning::network::{
@@ -121,14 +121,15 @@ fn write_curve(path: &Path, looks: &[Look]) -> anyhow::Result<()> {
     );
     for look in looks {
         let [a, b, c] = look.losses;
-        text.push_str(&format!(
-            "{},{a:.5},{b:.5},{c:.5},{:.4},{:.4},{:.4},{:.4}\n",
+        let _written = writeln!(
+            text,
+            "{},{a:.5},{b:.5},{c:.5},{:.4},{:.4},{:.4},{:.4}",
             look.step,
             look.inverse_m * 1e3,
             look.forward_m * 1e3,
             look.labels_m * 1e3,
             look.closest_m * 1e3,
-        ));
+        );
     }
     files::write(path, text).context("the curve")
 }
