@@ -14,7 +14,7 @@ use effigy_fusion::{
 use effigy_registration::BodyParams;
 use effigy_sim_sensor::dataset::{Dataset, Sequence, Split, protocol_camera};
 use glam::{Quat, Vec3};
-use rand::{Rng, RngExt as _, SeedableRng as _, rngs::StdRng};
+use rand::{Rng as _, RngExt as _, SeedableRng as _, rngs::StdRng};
 use rand_distr::{Distribution as _, StandardNormal};
 
 /// Of so many training sequences, one is held out.

@@ -1,8 +1,8 @@
 //! What a training will cost, said before it starts.
 
-use std::time::Instant;
-
 use effigy_avatar::meta::{PriorConfig, time_one_step};
+
+use crate::pipeline::clock::Clock;
 
 /// Prints the arithmetic and the time of `effigy train sdf`.
 pub(super) fn say_field(config: &PriorConfig) {
@@ -32,9 +32,9 @@ fn say(config: &PriorConfig, frames: f64) {
     // Six products of the forward pass's size (seed-systems 1.2), two operations a multiply-add.
     let per_frame =
         12.0 * field.parameter_count() as f64 * config.sampling.points_per_frame() as f64;
-    let start = Instant::now();
+    let start = Clock::start();
     let timed = time_one_step(config);
-    let secs = start.elapsed().as_secs_f64() / timed as f64 * frames;
+    let secs = start.secs() / timed as f64 * frames;
     println!(
         "about {:.1} TFLOP in the field, {:.1} minutes on this machine as busy as it is now",
         frames * per_frame / 1e12,

@@ -40,7 +40,7 @@ pub(crate) fn run(args: &TrainArgs) -> anyhow::Result<()> {
 fn field(args: &TrainShared) -> anyhow::Result<()> {
     let job = Job::new(args)?;
     estimate::say_field(&job.config);
-    let trained = job.run(train_field)?;
+    let trained = job.run(|training| Ok(train_field(training)?))?;
     job.finish(trained, "sdf", Precision::F32)
 }
 
@@ -48,7 +48,7 @@ fn hyper(args: &TrainHyperArgs) -> anyhow::Result<()> {
     let job = Job::new(&args.shared)?;
     let start = read_start(&args.start, &job)?;
     estimate::say_hyper(&job.config);
-    let trained = job.run(|training| train_hyper(&start, training))?;
+    let trained = job.run(|training| Ok(train_hyper(&start, training)?))?;
     job.finish(
         trained,
         &format!("sdf and hyper --start {}", args.start.display()),

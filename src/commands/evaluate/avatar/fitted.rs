@@ -35,7 +35,7 @@ pub(super) fn track(
     let run_ups = lessons
         .iter()
         .map(|lesson| run_up(lesson, views))
-        .collect::<anyhow::Result<Vec<_>>>()?;
+        .collect::<Vec<_>>();
     let camera = *views.camera();
     let tracker = Tracker::new(Arc::clone(body), camera, config.clone(), None);
     let mut follower = Follower { tracker, slot: 0 };
@@ -54,12 +54,12 @@ pub(super) fn track(
 }
 
 /// The frames that lead to a keyframe, and itself.
-fn run_up(lesson: &Lesson<'_>, views: &mut Views) -> anyhow::Result<Vec<Frame>> {
+fn run_up(lesson: &Lesson<'_>, views: &mut Views) -> Vec<Frame> {
     (0..=RUN_UP)
         .map(|number| {
             let before_secs = (RUN_UP - number) as f32 / RATE_HZ;
             let sequence = lesson.moved_by(-before_secs);
-            Ok(views.expose(&sequence, 0, lesson.yaw_rad)?.0)
+            views.expose(&sequence, 0, lesson.yaw_rad).0
         })
         .collect()
 }

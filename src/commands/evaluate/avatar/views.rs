@@ -3,7 +3,8 @@
 use std::sync::Arc;
 
 use effigy_capture::{
-    Calibration, CameraModel, Distortion, Frame, FrameId, Rigid3, SensorModel, Timestamp,
+    Calibration, CameraModel, DepthImage, Distortion, Frame, FrameId, Rigid3, SensorModel,
+    Timestamp,
 };
 use effigy_fusion::clean::{CleanConfig, Cleaner};
 use effigy_registration::{RegisteredFrame, Tracking};
@@ -75,7 +76,7 @@ impl Views {
         frame: usize,
         yaw_rad: f32,
     ) -> anyhow::Result<RegisteredFrame> {
-        let (exposure, world_from_camera) = self.expose(sequence, frame, yaw_rad)?;
+        let (exposure, world_from_camera) = self.expose(sequence, frame, yaw_rad);
         let tracking = Tracking::Tracked {
             params: sequence.params(frame),
             residual_rms_m: 0.0,
@@ -91,7 +92,7 @@ impl Views {
         sequence: &Sequence,
         frame: usize,
         yaw_rad: f32,
-    ) -> anyhow::Result<(Frame, Rigid3)> {
+    ) -> (Frame, Rigid3) {
         let (depth, world_from_camera) = match self.camera {
             Camera::Paper => {
                 let (depth, world_from_camera) = sequence.protocol_depth(frame, yaw_rad);
@@ -116,7 +117,7 @@ impl Views {
             color: None,
         };
         self.taken += 1;
-        Ok((exposure, world_from_camera))
+        (exposure, world_from_camera)
     }
 }
 

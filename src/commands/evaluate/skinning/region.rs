@@ -177,7 +177,10 @@ mod tests {
         );
         assert_eq!(
             count(15, Region::Free),
-            body.part_labels().iter().filter(|&&b| b == 15).count()
+            body.part_labels()
+                .into_iter()
+                .filter(|&bone| usize::from(bone) == 15)
+                .count()
         );
         assert_eq!(count(16, Region::InnerThigh), 0);
     }
