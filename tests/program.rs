@@ -476,7 +476,7 @@ fn a_recording_cut_off_plays_up_to_the_cut_and_says_what_is_missing() {
 }
 
 /// A training of a few seconds: tiny networks, a handful of steps.
-const TINY_TRAINING: &str = r#"
+const TINY_TRAINING: &str = r"
 [network]
 heads = { low_rank = 4 }
 [network.field]
@@ -497,7 +497,7 @@ frames_per_person = 1
 outer_steps = 1
 frames = 2
 inner_steps = 2
-"#;
+";
 
 #[test]
 fn training_gives_the_same_network_twice_and_says_what_it_needs() {

@@ -23,13 +23,14 @@ fn random(count: usize, seed: u64) -> Vec<f32> {
         .collect()
 }
 
+/// Parameters and input give the output.
+type Forward<'a> = dyn Fn(&[f32], &[f32]) -> Vec<f32> + 'a;
+
+/// Parameters, input, the output's gradient and the parameters' gradient to add to, give the input's gradient.
+type Backward<'a> = dyn Fn(&[f32], &[f32], &[f32], &mut [f32]) -> Vec<f32> + 'a;
+
 /// A loss whose gradient by an output is `weights`, and a test of both gradients.
-fn check(
-    parameters: &[f32],
-    input: &[f32],
-    forward: &dyn Fn(&[f32], &[f32]) -> Vec<f32>,
-    backward: &dyn Fn(&[f32], &[f32], &[f32], &mut [f32]) -> Vec<f32>,
-) {
+fn check(parameters: &[f32], input: &[f32], forward: &Forward<'_>, backward: &Backward<'_>) {
     let out = forward(parameters, input);
     let weights = random(out.len(), 5);
     let loss = |parameters: &[f32], input: &[f32]| -> f64 {

@@ -116,7 +116,7 @@ impl<'a> Job<'a> {
 
     fn run(
         &self,
-        train: impl FnOnce(Training<'_>) -> Result<Option<HyperNetwork>, effigy_avatar::AvatarError>,
+        train: impl FnOnce(Training<'_>) -> anyhow::Result<Option<HyperNetwork>>,
     ) -> anyhow::Result<Option<HyperNetwork>> {
         let people = self.judges.iter().map(|judge| judge.held_out.clone());
         let validation = Validation::new(people.collect());
