@@ -156,9 +156,9 @@ mod tests {
         let sampling =
             SamplingConfig { surface: 160, near: 64, free: 32, uniform: 64, ..Default::default() };
         let config = FineTuneConfig {
-            steps: 400,
+            steps: 800,
             sampling,
-            rates: RateConfig { field: 1e-3, ..RateConfig::default() },
+            rates: RateConfig { field: 2e-4, ..RateConfig::default() },
             ..FineTuneConfig::default()
         };
         let mut field = ConditionedField::new(Architecture::Siren, 1);

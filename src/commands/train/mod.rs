@@ -49,11 +49,7 @@ fn hyper(args: &TrainHyperArgs) -> anyhow::Result<()> {
     let start = read_start(&args.start, &job)?;
     estimate::say_hyper(&job.config);
     let trained = job.run(|training| Ok(train_hyper(&start, training)?))?;
-    job.finish(
-        trained,
-        &format!("sdf and hyper --start {}", args.start.display()),
-        Precision::F16,
-    )
+    job.finish(trained, "sdf and hyper", Precision::F16)
 }
 
 /// The field to start from.

@@ -72,12 +72,13 @@ impl<'a> Reporter<'a> {
         }
     }
 
-    /// Ends the bar; what could not be written.
+    /// Ends the bar and writes the whole curve; what could not be written.
     pub(super) fn finish(self) -> anyhow::Result<()> {
         if let Some((_, bar)) = &self.bar {
             bar.finish();
         }
-        self.problem.map_or(Ok(()), Err)
+        self.problem.map_or(Ok(()), Err)?;
+        self.curve.write(&self.out)
     }
 
     fn step(&mut self, now: &PriorProgress) {
