@@ -7,7 +7,7 @@ use std::{
 };
 
 use anyhow::Context as _;
-use serde::Serialize;
+use serde::{Serialize, de::DeserializeOwned};
 
 /// Fails now rather than after the work; an existing file stays as it is.
 pub(crate) fn check_writable(path: &Path) -> anyhow::Result<()> {
@@ -17,6 +17,13 @@ pub(crate) fn check_writable(path: &Path) -> anyhow::Result<()> {
 
 pub(crate) fn write(path: &Path, content: impl AsRef<[u8]>) -> anyhow::Result<()> {
     explained(fs::write(path, content), path)
+}
+
+/// Settings from a TOML file; what it does not name keeps its default.
+pub(crate) fn read_toml<T: DeserializeOwned>(path: &Path) -> anyhow::Result<T> {
+    let text = fs::read_to_string(path)
+        .with_context(|| format!("{}: cannot read the settings", path.display()))?;
+    toml::from_str(&text).with_context(|| format!("{}: these settings do not fit", path.display()))
 }
 
 /// Pretty-printed JSON.

@@ -9,7 +9,7 @@ use effigy_sim_sensor::dataset::{
     CapeImport, Dataset, DatasetPlan, DatasetPreset, Gender, MakeProgress, Manifest, Sequence,
     SequenceEntry, Split, import_cape, make,
 };
-use effigy_viewer::pictures::{Clay, ContactSheet, MeshView, PictureCamera, render_mesh};
+use effigy_viewer::pictures::{Clay, ContactSheet, MeshView, Picture, PictureCamera, render_mesh};
 
 use crate::{
     cli::{CapeGender, DatasetArgs, DatasetMakeArgs, DatasetViewArgs, DatasetWhat, ImportCapeArgs},
@@ -135,18 +135,13 @@ fn add_row(mut sheet: ContactSheet, entry: &SequenceEntry, sequence: &Sequence) 
         } else {
             format!("{} {frame}", plan.action)
         };
-        sheet = sheet.add(label, drawn(&sequence.posed_mesh(frame)));
+        sheet = sheet.add(label, drawn(&sequence.posed_mesh(frame), TILE_PX));
     }
-    sheet.add("star pose", drawn(&sequence.star_mesh(last)))
+    sheet.add("star pose", drawn(&sequence.star_mesh(last), TILE_PX))
 }
 
-fn drawn(mesh: &TriangleMesh) -> effigy_viewer::pictures::Picture {
-    let camera = PictureCamera::around(&mesh.vertices, 0.4, 0.1, TILE_PX);
-    let view = MeshView {
-        vertices: &mesh.vertices,
-        normals: &mesh.normals,
-        triangles: &mesh.triangles,
-        colors: &[],
-    };
-    render_mesh(view, &camera, Clay::default())
+/// In clay, a little from the side and from above.
+pub(super) fn drawn(mesh: &TriangleMesh, size_px: [u32; 2]) -> Picture {
+    let camera = PictureCamera::around(&mesh.vertices, 0.4, 0.1, size_px);
+    render_mesh(MeshView::from(mesh), &camera, Clay::default())
 }

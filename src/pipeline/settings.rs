@@ -16,6 +16,8 @@ use effigy_fusion::clean::CleanConfig;
 use effigy_registration::{smpl::BodyIdentity, track::TrackConfig};
 use serde::{Deserialize, Serialize};
 
+use crate::files;
+
 /// More would not be few shots any more, and fill the memory.
 pub(crate) const MOST_KEYFRAMES: usize = 64;
 
@@ -61,10 +63,7 @@ impl Settings {
         let Some(path) = path else {
             return Ok(Self::default());
         };
-        let text = fs::read_to_string(path)
-            .with_context(|| format!("{}: cannot read the settings", path.display()))?;
-        let settings: Self = toml::from_str(&text)
-            .with_context(|| format!("{}: these settings do not fit", path.display()))?;
+        let settings: Self = files::read_toml(path)?;
         settings
             .check()
             .with_context(|| path.display().to_string())?;

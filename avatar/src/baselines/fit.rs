@@ -3,13 +3,16 @@
 use std::ops::ControlFlow;
 
 use glam::Vec3;
-use rand::{RngExt as _, SeedableRng as _, rngs::StdRng};
+use rand::{SeedableRng as _, rngs::StdRng};
 
 use super::{BodyLabels, ConditionedField, occupancy::occupancy_loss};
 use crate::{
     CanonicalSamples,
     error::AvatarError,
-    fine_tune::{FineTuneConfig, sampling::KeyframePoints},
+    fine_tune::{
+        FineTuneConfig,
+        sampling::{self, KeyframePoints},
+    },
     nn::{
         AdamConfig, AdamStep,
         adam::Moments,
@@ -31,7 +34,7 @@ pub fn fit(
         return Err(AvatarError::NoKeyframes);
     }
     let mut rng = StdRng::seed_from_u64(config.seed);
-    let keyframes = keyframes(samples, &mut rng);
+    let keyframes = sampling::keyframes(samples, 0.0, &mut rng);
     let mut moments = Moments::zeros(field.mlp.parameters.len());
     let mut gradients = MlpGradients::default();
     for step in 0..config.steps {
@@ -71,18 +74,6 @@ pub fn fit(
     Ok(())
 }
 
-fn keyframes(samples: &[CanonicalSamples], rng: &mut StdRng) -> Vec<KeyframePoints> {
-    let weights = || {
-        samples
-            .iter()
-            .flat_map(|s| &s.weights)
-            .filter(|w| **w > 0.0)
-    };
-    let mean_weight = weights().sum::<f32>() / weights().count().max(1) as f32;
-    let keyframe = |samples: &CanonicalSamples| KeyframePoints::new(samples, mean_weight, 0.0, rng);
-    samples.iter().map(keyframe).collect()
-}
-
 /// One step's points of one keyframe.
 struct Drawn {
     keyframe: usize,
@@ -96,14 +87,7 @@ fn draw(
     config: &FineTuneConfig,
     rng: &mut StdRng,
 ) -> Vec<Drawn> {
-    let count = keyframes.len();
-    let mut numbers: Vec<usize> = (0..count).collect();
-    if (1..count).contains(&config.frames_per_step) {
-        for place in 0..config.frames_per_step {
-            numbers.swap(place, rng.random_range(place..count));
-        }
-        numbers.truncate(config.frames_per_step);
-    }
+    let numbers = sampling::choose(keyframes.len(), config.frames_per_step, rng);
     let mut drawn = Vec::with_capacity(numbers.len());
     for keyframe in numbers {
         let (mut points, mut known) = (Vec::new(), Vec::new());

@@ -62,6 +62,38 @@ pub(crate) struct SurfacePoint {
     pub(crate) weight: f32,
 }
 
+/// Every frame's points, weights divided by the mean of all that count; this share of each is held out.
+pub(crate) fn keyframes(
+    samples: &[CanonicalSamples],
+    held_out_share: f32,
+    rng: &mut impl Rng,
+) -> Vec<KeyframePoints> {
+    let weights = || {
+        samples
+            .iter()
+            .flat_map(|s| &s.weights)
+            .filter(|weight| **weight > 0.0)
+    };
+    let mean_weight = weights().sum::<f32>() / weights().count().max(1) as f32;
+    samples
+        .iter()
+        .map(|s| KeyframePoints::new(s, mean_weight, held_out_share, rng))
+        .collect()
+}
+
+/// The numbers of `wanted` frames of `count`, none twice, in random order; of all in order if so many are not there,
+/// or 0 are wanted.
+pub(crate) fn choose(count: usize, wanted: usize, rng: &mut impl Rng) -> Vec<usize> {
+    let mut numbers: Vec<usize> = (0..count).collect();
+    if (1..count).contains(&wanted) {
+        for place in 0..wanted {
+            numbers.swap(place, rng.random_range(place..count));
+        }
+        numbers.truncate(wanted);
+    }
+    numbers
+}
+
 impl KeyframePoints {
     /// All of a surface, each point of weight one, none held out.
     pub(crate) fn whole(points: &[Vec3], normals: &[Vec3]) -> Self {

@@ -3,10 +3,13 @@
 use std::ops::ControlFlow;
 
 use glam::Vec3;
-use rand::{RngExt as _, SeedableRng as _, rngs::StdRng};
+use rand::{SeedableRng as _, rngs::StdRng};
 use serde::{Deserialize, Serialize};
 
-use super::{FineTuneConfig, sampling::KeyframePoints};
+use super::{
+    FineTuneConfig,
+    sampling::{self, KeyframePoints},
+};
 use crate::{
     CanonicalSamples, PoseInput, SignedDistanceField as _,
     error::AvatarError,
@@ -94,17 +97,7 @@ impl FineTuner {
     ) -> Result<Self, AvatarError> {
         check(samples)?;
         let mut rng = StdRng::seed_from_u64(config.seed);
-        let weights = || {
-            samples
-                .iter()
-                .flat_map(|s| &s.weights)
-                .filter(|weight| **weight > 0.0)
-        };
-        let mean_weight = weights().sum::<f32>() / weights().count().max(1) as f32;
-        let keyframes = samples
-            .iter()
-            .map(|s| KeyframePoints::new(s, mean_weight, config.held_out_share, &mut rng))
-            .collect();
+        let keyframes = sampling::keyframes(samples, config.held_out_share, &mut rng);
         let poses: Vec<_> = samples.iter().map(|s| s.pose).collect();
         let inputs = network.output_inputs(&poses);
         Ok(Self {
@@ -124,7 +117,8 @@ impl FineTuner {
 
     /// One Adam step over all keyframes, or as many as a step takes; the loss before it.
     pub fn step(&mut self) -> Result<LossTerms, AvatarError> {
-        let taken = self.draw_keyframes();
+        let wanted = self.config.frames_per_step;
+        let taken = sampling::choose(self.keyframes.len(), wanted, &mut self.rng);
         let drawn = self.points.iter_mut().zip(&mut self.known);
         for (&keyframe, (points, known)) in taken.iter().zip(drawn) {
             self.keyframes[keyframe].draw(&self.config.sampling, &mut self.rng, points, known);
@@ -148,20 +142,6 @@ impl FineTuner {
         self.optimizer.step(&mut self.network, &gradient, share);
         self.step += 1;
         Ok(terms)
-    }
-
-    /// The keyframes of the next step, none twice.
-    fn draw_keyframes(&mut self) -> Vec<usize> {
-        let count = self.keyframes.len();
-        let mut numbers: Vec<usize> = (0..count).collect();
-        let wanted = self.config.frames_per_step;
-        if (1..count).contains(&wanted) {
-            for place in 0..wanted {
-                numbers.swap(place, self.rng.random_range(place..count));
-            }
-            numbers.truncate(wanted);
-        }
-        numbers
     }
 
     /// Mean distance to the surface of points that no step has seen, weighted as the loss weighs them.

@@ -10,22 +10,18 @@ use glam::Vec3;
 use rand::{RngExt as _, rngs::StdRng};
 
 use super::{
+    batch::Batch,
     checkpoint::{Vectors, bytes_of, floats},
     config::{AdaptConfig, OuterStep, PriorConfig},
     reptile::{person_number, rng_of},
-    task::{Person, PersonFrame, PersonSource},
+    task::{Person, PersonFrame, PersonSource, Prepared},
     train::{Learner, Stage},
 };
 use crate::{
-    PoseInput,
     error::AvatarError,
     fine_tune::sampling::KeyframePoints,
     hyper::{
         HyperNetwork, Precision, RateConfig, network::HyperGradient, optimizer::HyperOptimizer,
-    },
-    sdf::{
-        batch::{FieldFrame, FieldGradients},
-        loss::LossPoint,
     },
 };
 
@@ -36,15 +32,7 @@ pub(super) struct Adapt {
     start: HyperNetwork,
     /// Of outer steps by gradient.
     optimizer: HyperOptimizer,
-    gradients: FieldGradients,
-    points: Vec<Vec<Vec3>>,
-    known: Vec<Vec<LossPoint>>,
-}
-
-/// Some frames, to be drawn from.
-struct Frames {
-    poses: Vec<PoseInput>,
-    points: Vec<KeyframePoints>,
+    batch: Batch,
 }
 
 impl Adapt {
@@ -63,11 +51,9 @@ impl Adapt {
         let inputs = network.output_inputs(&poses);
         Self {
             optimizer: HyperOptimizer::new(&network, &inputs, &rates),
-            gradients: FieldGradients::new(config.network.field),
+            batch: Batch::new(config.network.field),
             start: network.clone(),
             network,
-            points: Vec::new(),
-            known: Vec::new(),
         }
     }
 
@@ -75,7 +61,7 @@ impl Adapt {
     fn adapted(
         &mut self,
         number: u32,
-        seen: &Frames,
+        seen: &Prepared,
         config: &PriorConfig,
         rng: &mut StdRng,
     ) -> Result<HyperNetwork, AvatarError> {
@@ -96,31 +82,16 @@ impl Adapt {
     fn gradient(
         &mut self,
         network: &HyperNetwork,
-        frames: &Frames,
+        frames: &Prepared,
         number: u32,
         config: &PriorConfig,
         rng: &mut StdRng,
     ) -> Result<(f64, HyperGradient), AvatarError> {
-        self.points.resize_with(frames.poses.len(), Vec::new);
-        self.known.resize_with(frames.poses.len(), Vec::new);
-        let drawn = self.points.iter_mut().zip(&mut self.known);
-        for (frame, (points, known)) in frames.points.iter().zip(drawn) {
-            frame.draw(&config.sampling, rng, points, known);
-        }
+        let points: Vec<_> = frames.points.iter().collect();
+        self.batch.draw(&points, config, rng);
         let (cache, parameters) = network.forward(&frames.poses);
-        let fields: Vec<_> = parameters
-            .iter()
-            .zip(self.points.iter().zip(&self.known))
-            .map(|(parameters, (points, known))| FieldFrame { parameters, points, known })
-            .collect();
-        let terms = self.gradients.compute(&fields, &config.loss);
-        if !terms.total().is_finite() {
-            return Err(AvatarError::LossNotFinite { step: number, terms });
-        }
-        let bars: Vec<_> = (0..fields.len())
-            .map(|frame| self.gradients.frame(frame))
-            .collect();
-        Ok((terms.total(), network.backward(cache, &bars)))
+        let loss = self.batch.loss(&parameters, config, number)?;
+        Ok((loss, network.backward(cache, &self.batch.bars())))
     }
 }
 
@@ -185,20 +156,17 @@ impl Learner for Adapt {
 }
 
 /// Every other frame as seen from one side, an eighth of a turn on from frame to frame; the others whole.
-fn split(person: Person, rng: &mut StdRng) -> (Frames, Frames) {
+fn split(person: Person, rng: &mut StdRng) -> (Prepared, Prepared) {
     let first_rad = rng.random_range(0.0..TAU);
-    let mut seen = Frames { poses: Vec::new(), points: Vec::new() };
-    let mut others = Frames { poses: Vec::new(), points: Vec::new() };
+    let mut seen = Prepared::default();
+    let mut others = Prepared::default();
     for (index, frame) in person.frames.into_iter().enumerate() {
         if index % 2 == 0 {
             let heading_rad = first_rad + (index / 2) as f32 * TAU / 8.0;
             seen.poses.push(frame.pose);
             seen.points.push(one_side(&frame, heading_rad));
         } else {
-            others.poses.push(frame.pose);
-            others
-                .points
-                .push(KeyframePoints::whole(&frame.points_in_unit, &frame.normals));
+            others.push(&frame);
         }
     }
     (seen, others)

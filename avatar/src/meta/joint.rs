@@ -4,11 +4,11 @@
 //! differ and how their surfaces follow the pose. Fine-tuning finds a new person's code in the coefficients'
 //! bias, which starts at the mean of all codes.
 
-use glam::Vec3;
 use rand::{RngExt as _, rngs::StdRng, seq::SliceRandom as _};
 use rayon::prelude::*;
 
 use super::{
+    batch::Batch,
     checkpoint::{Vectors, bytes_of, floats},
     config::PriorConfig,
     reptile::{person_number, rng_of},
@@ -19,11 +19,7 @@ use crate::{
     error::AvatarError,
     hyper::{HyperNetwork, Precision, optimizer::HyperOptimizer},
     nn::{AdamConfig, AdamStep, adam::Moments},
-    sdf::{
-        SirenField,
-        batch::{FieldFrame, FieldGradients},
-        loss::LossPoint,
-    },
+    sdf::SirenField,
 };
 
 /// The stage in progress.
@@ -36,9 +32,7 @@ pub(super) struct Joint {
     /// Steps each code has taken.
     code_steps: Vec<u32>,
     people: Vec<Prepared>,
-    gradients: FieldGradients,
-    points: Vec<Vec<Vec3>>,
-    known: Vec<Vec<LossPoint>>,
+    batch: Batch,
 }
 
 impl Joint {
@@ -49,7 +43,7 @@ impl Joint {
         let people: Vec<_> = (0..config.joint.people as u64)
             .into_par_iter()
             .map(|index| {
-                Prepared::new(source.person(person_number(500_000 + index), config.joint.frames))
+                Prepared::new(&source.person(person_number(500_000 + index), config.joint.frames))
             })
             .collect();
         let inputs = network.output_inputs(&people[0].poses);
@@ -59,11 +53,9 @@ impl Joint {
             codes: vec![vec![0.0; size]; people.len()],
             code_moments: vec![Moments::zeros(size); people.len()],
             code_steps: vec![0; people.len()],
-            gradients: FieldGradients::new(config.network.field),
+            batch: Batch::new(config.network.field),
             network,
             people,
-            points: Vec::new(),
-            known: Vec::new(),
         }
     }
 
@@ -141,39 +133,26 @@ impl Learner for Joint {
     ) -> Result<f64, AvatarError> {
         let mut rng = rng_of(config.seed ^ 0x5eed, u64::from(number));
         let chosen = self.choose(config, &mut rng);
-        let poses: Vec<_> = chosen
+        let (poses, points): (Vec<_>, Vec<_>) = chosen
             .iter()
-            .map(|(p, f)| self.people[*p].poses[*f])
-            .collect();
-        self.points.resize_with(chosen.len(), Vec::new);
-        self.known.resize_with(chosen.len(), Vec::new);
-        let drawn = self.points.iter_mut().zip(&mut self.known);
-        for ((person, frame), (points, known)) in chosen.iter().zip(drawn) {
-            self.people[*person].points[*frame].draw(&config.sampling, &mut rng, points, known);
-        }
+            .map(|&(person, frame)| {
+                let person = &self.people[person];
+                (person.poses[frame], &person.points[frame])
+            })
+            .unzip();
+        self.batch.draw(&points, config, &mut rng);
         let codes: Vec<_> = chosen
             .iter()
             .map(|(person, _)| self.codes[*person].as_slice())
             .collect();
         let (cache, parameters) = self.network.forward_with_codes(&poses, &codes);
-        let frames: Vec<_> = parameters
-            .iter()
-            .zip(self.points.iter().zip(&self.known))
-            .map(|(parameters, (points, known))| FieldFrame { parameters, points, known })
-            .collect();
-        let terms = self.gradients.compute(&frames, &config.loss);
-        if !terms.total().is_finite() {
-            return Err(AvatarError::LossNotFinite { step: number, terms });
-        }
-        let bars: Vec<_> = (0..frames.len())
-            .map(|frame| self.gradients.frame(frame))
-            .collect();
-        let gradient = self.network.backward(cache, &bars);
+        let loss = self.batch.loss(&parameters, config, number)?;
+        let gradient = self.network.backward(cache, &self.batch.bars());
         let share = rate_share(number, config);
         let code_bars = gradient.code_bars();
         self.optimizer.step(&mut self.network, &gradient, share);
         self.step_codes(&chosen, &code_bars, config, share);
-        Ok(terms.total())
+        Ok(loss)
     }
 
     /// With the mean code in the coefficients' biases.

@@ -6,6 +6,7 @@
 //! single views ends well. People come from the caller: this crate knows no simulator.
 
 mod adapt;
+mod batch;
 mod checkpoint;
 mod config;
 mod joint;

@@ -5,11 +5,11 @@
 
 use std::sync::Arc;
 
-use glam::Vec3;
 use rand::{RngExt as _, SeedableRng as _, rngs::StdRng};
 use rayon::prelude::*;
 
 use super::{
+    batch::Batch,
     checkpoint::{Vectors, bytes_of, floats},
     config::PriorConfig,
     task::{PersonSource, Prepared},
@@ -19,11 +19,7 @@ use crate::{
     error::AvatarError,
     hyper::HyperNetwork,
     nn::{AdamConfig, AdamStep, adam::Moments},
-    sdf::{
-        SirenField,
-        batch::{FieldFrame, FieldGradients},
-        loss::LossPoint,
-    },
+    sdf::SirenField,
 };
 
 /// The stage in progress; the whole state is the field, the warm-up's moments and the step number.
@@ -31,9 +27,7 @@ pub(super) struct Reptile {
     parameters: Vec<f32>,
     moments: Moments,
     cohort: Option<(u32, Arc<Vec<Prepared>>)>,
-    gradients: FieldGradients,
-    points: Vec<Vec<Vec3>>,
-    known: Vec<Vec<LossPoint>>,
+    batch: Batch,
 }
 
 /// Warm-up steps with the same people.
@@ -48,9 +42,7 @@ impl Reptile {
             moments: Moments::zeros(parameters.len()),
             parameters,
             cohort: None,
-            gradients: FieldGradients::new(config.network.field),
-            points: Vec::new(),
-            known: Vec::new(),
+            batch: Batch::new(config.network.field),
         }
     }
 
@@ -68,12 +60,12 @@ impl Reptile {
             .map(|person| (person, parameters.as_slice()))
             .collect();
         let loss = self.loss_gradient(&frames, config, &mut rng, number)?;
-        let mut gradient = self.gradients.frame(0).to_vec();
-        for frame in 1..cohort.len() {
-            let part = self.gradients.frame(frame);
+        let bars = self.batch.bars();
+        let mut gradient = bars[0].to_vec();
+        for part in &bars[1..] {
             gradient
                 .iter_mut()
-                .zip(part)
+                .zip(*part)
                 .for_each(|(sum, part)| *sum += part);
         }
         let left = 1.0 - number as f32 / config.reptile.warm_up_steps as f32;
@@ -98,7 +90,7 @@ impl Reptile {
                 let person = |i| source.person(person_number(u64::from(epoch) * size + i), 1);
                 let cohort: Vec<_> = (0..size)
                     .into_par_iter()
-                    .map(|i| Prepared::new(person(i)))
+                    .map(|i| Prepared::new(&person(i)))
                     .collect();
                 let cohort = Arc::new(cohort);
                 self.cohort = Some((epoch, Arc::clone(&cohort)));
@@ -120,7 +112,7 @@ impl Reptile {
             .collect();
         let people: Vec<_> = numbers
             .par_iter()
-            .map(|n| Prepared::new(source.person(*n, 1)))
+            .map(|n| Prepared::new(&source.person(*n, 1)))
             .collect();
         let mut adapted = vec![self.parameters.clone(); people.len()];
         let mut moments = vec![Moments::zeros(self.parameters.len()); people.len()];
@@ -133,8 +125,9 @@ impl Reptile {
                 .collect();
             loss = self.loss_gradient(&frames, config, &mut rng, number)?;
             let step = AdamStep::new(AdamConfig::default(), inner + 1);
-            for (frame, (own, moments)) in adapted.iter_mut().zip(&mut moments).enumerate() {
-                moments.step(&step, reptile.inner_rate, self.gradients.frame(frame), own);
+            let own = adapted.iter_mut().zip(&mut moments);
+            for (bar, (own, moments)) in self.batch.bars().into_iter().zip(own) {
+                moments.step(&step, reptile.inner_rate, bar, own);
             }
         }
         let outer = number - reptile.warm_up_steps;
@@ -154,23 +147,12 @@ impl Reptile {
         rng: &mut StdRng,
         number: u32,
     ) -> Result<f64, AvatarError> {
-        self.points.resize_with(people.len(), Vec::new);
-        self.known.resize_with(people.len(), Vec::new);
-        let drawn = self.points.iter_mut().zip(&mut self.known);
-        for ((person, _), (points, known)) in people.iter().zip(drawn) {
-            person.points[0].draw(&config.sampling, rng, points, known);
-        }
-        let frames: Vec<_> = people
+        let (points, fields): (Vec<_>, Vec<_>) = people
             .iter()
-            .zip(self.points.iter().zip(&self.known))
-            .map(|((_, parameters), (points, known))| FieldFrame { parameters, points, known })
-            .collect();
-        let terms = self.gradients.compute(&frames, &config.loss);
-        if terms.total().is_finite() {
-            Ok(terms.total())
-        } else {
-            Err(AvatarError::LossNotFinite { step: number, terms })
-        }
+            .map(|(person, parameters)| (&person.points[0], *parameters))
+            .unzip();
+        self.batch.draw(&points, config, rng);
+        self.batch.loss(&fields, config, number)
     }
 }
 

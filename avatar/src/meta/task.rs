@@ -31,19 +31,25 @@ impl<F: Fn(u64, usize) -> Person + Sync> PersonSource for F {
 }
 
 /// A person's frames, ready to be drawn from.
+#[derive(Default)]
 pub(super) struct Prepared {
     pub(super) poses: Vec<PoseInput>,
     pub(super) points: Vec<KeyframePoints>,
 }
 
 impl Prepared {
-    pub(super) fn new(person: Person) -> Self {
-        let poses = person.frames.iter().map(|frame| frame.pose).collect();
-        let points = person
-            .frames
-            .into_iter()
-            .map(|frame| KeyframePoints::whole(&frame.points_in_unit, &frame.normals))
-            .collect();
-        Self { poses, points }
+    pub(super) fn new(person: &Person) -> Self {
+        let mut prepared = Self::default();
+        for frame in &person.frames {
+            prepared.push(frame);
+        }
+        prepared
+    }
+
+    /// Adds a whole surface.
+    pub(super) fn push(&mut self, frame: &PersonFrame) {
+        let points = KeyframePoints::whole(&frame.points_in_unit, &frame.normals);
+        self.poses.push(frame.pose);
+        self.points.push(points);
     }
 }

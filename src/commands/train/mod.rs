@@ -202,12 +202,7 @@ fn people(args: &TrainShared, body: &Arc<BodyModel>) -> anyhow::Result<(People, 
 
 fn config(args: &TrainShared) -> anyhow::Result<PriorConfig> {
     let mut config = match &args.config {
-        Some(path) => {
-            let text = fs::read_to_string(path)
-                .with_context(|| format!("{}: cannot read the settings", path.display()))?;
-            toml::from_str(&text)
-                .with_context(|| format!("{}: these settings do not fit", path.display()))?
-        }
+        Some(path) => files::read_toml(path)?,
         None => PriorConfig::default(),
     };
     if args.preset == TrainPreset::Paper {

@@ -11,10 +11,10 @@ use effigy_avatar::{
     meta::{PriorProgress, Stage, TrainEvent, Validated},
 };
 use effigy_fusion::TriangleMesh;
-use effigy_viewer::pictures::{Clay, ContactSheet, MeshView, Picture, PictureCamera, render_mesh};
+use effigy_viewer::pictures::ContactSheet;
 
 use super::{curve::Curve, held_out::Judge};
-use crate::{interrupt, progress::Progress};
+use crate::{commands::dataset::drawn, interrupt, progress::Progress};
 
 const TILE_PX: [u32; 2] = [300, 360];
 /// Of the pictures' meshes: cells of about 1.5 cm.
@@ -109,8 +109,11 @@ impl<'a> Reporter<'a> {
         let mut sheet = ContactSheet::new(4);
         for (judge, network) in self.judges.iter().zip(&validated.tuned) {
             sheet = sheet
-                .add(judge.name.clone(), drawn(&judge.truth_in_star))
-                .add("fine-tuned".to_owned(), drawn(&learned(judge, network)));
+                .add(judge.name.clone(), drawn(&judge.truth_in_star, TILE_PX))
+                .add(
+                    "fine-tuned".to_owned(),
+                    drawn(&learned(judge, network), TILE_PX),
+                );
         }
         let stage = format!("{:?}", now.stage).to_lowercase();
         sheet.save(
@@ -134,15 +137,4 @@ fn learned(judge: &Judge, network: &HyperNetwork) -> TriangleMesh {
     }
     mesh.compute_normals();
     mesh
-}
-
-fn drawn(mesh: &TriangleMesh) -> Picture {
-    let camera = PictureCamera::around(&mesh.vertices, 0.4, 0.1, TILE_PX);
-    let view = MeshView {
-        vertices: &mesh.vertices,
-        normals: &mesh.normals,
-        triangles: &mesh.triangles,
-        colors: &[],
-    };
-    render_mesh(view, &camera, Clay::default())
 }

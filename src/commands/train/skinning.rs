@@ -31,8 +31,7 @@ pub(crate) fn run(args: &TrainSkinningArgs) -> anyhow::Result<()> {
     }
     let body = builtin::body();
     let mut config = match &args.config {
-        Some(path) => toml::from_str(&fs::read_to_string(path)?)
-            .with_context(|| path.display().to_string())?,
+        Some(path) => files::read_toml(path)?,
         None => SkinningTrainConfig::default(),
     };
     config.seed = args.seed;

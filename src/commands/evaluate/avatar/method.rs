@@ -39,7 +39,7 @@ const FRAMES_PER_STEP: usize = 8;
 /// More frames are seen as often each as eight are, but no more steps are taken than this many times the live chain's.
 const MOST_STEPS_FACTOR: u32 = 4;
 
-/// Other people's ways take this many times our steps, each over half the keyframes: about five times our time.
+/// Other people's ways take this many times our steps, each over half the keyframes; not timed yet.
 const BASELINE_STEPS_FACTOR: u32 = 4;
 const BASELINE_FRAMES_PER_STEP: usize = 4;
 /// Adam's rates of networks that start from nothing, and of those that know people.
