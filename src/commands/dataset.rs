@@ -6,8 +6,8 @@ use anyhow::bail;
 use effigy_fusion::TriangleMesh;
 use effigy_registration::{BodyModel, smpl::builtin};
 use effigy_sim_sensor::dataset::{
-    CapeImport, Dataset, DatasetPlan, DatasetPreset, Gender, MakeProgress, Manifest, Sequence,
-    SequenceEntry, Split, import_cape, make,
+    CapeImport, ClothFacts, Dataset, DatasetPlan, DatasetPreset, Gender, MakeProgress, Manifest,
+    Sequence, SequenceEntry, Split, import_cape, make,
 };
 use effigy_viewer::pictures::{Clay, ContactSheet, MeshView, Picture, PictureCamera, render_mesh};
 
@@ -47,7 +47,11 @@ fn make_dataset(args: &DatasetMakeArgs) -> anyhow::Result<()> {
         println!("stopped; the same command goes on from here");
         return Ok(());
     };
-    println!("{}", summary(&args.out, &manifest));
+    println!(
+        "{}{}",
+        summary(&args.out, &manifest),
+        cloth_table(&manifest)
+    );
     Ok(())
 }
 
@@ -97,6 +101,43 @@ fn summary(folder: &Path, manifest: &Manifest) -> String {
     )
 }
 
+/// What the clothes of each outfit do, over its sequences; empty where none are simulated.
+fn cloth_table(manifest: &Manifest) -> String {
+    let mut outfits: BTreeMap<(&str, &str), Vec<ClothFacts>> = BTreeMap::new();
+    for entry in &manifest.sequences {
+        if let Some(facts) = entry.cloth {
+            let outfit = (entry.plan.split.name(), entry.plan.outfit.name());
+            outfits.entry(outfit).or_default().push(facts);
+        }
+    }
+    let mut table = String::new();
+    for ((split, outfit), facts) in outfits {
+        if table.is_empty() {
+            table += "\n| clothes | sequences | strained edges, mean (worst) | deep in the body, mean (worst) | strays, rms | history floor |\n|---|---|---|---|---|---|";
+        }
+        let mean = |of: fn(&ClothFacts) -> f32| {
+            facts.iter().map(of).sum::<f32>() / facts.len().max(1) as f32
+        };
+        let worst = |of: fn(&ClothFacts) -> f32| facts.iter().map(of).fold(0.0, f32::max);
+        let floors: Vec<f32> = facts.iter().filter_map(|f| f.history_floor_cm).collect();
+        let floor = if floors.is_empty() {
+            "-".to_owned()
+        } else {
+            format!("{:.2} cm", floors.iter().sum::<f32>() / floors.len() as f32)
+        };
+        table += &format!(
+            "\n| {split} `{outfit}` | {} | {:.2} ({:.2}) % | {:.3} ({:.3}) % | {:.1} mm | {floor} |",
+            facts.len(),
+            100.0 * mean(|f| f.strained_share),
+            100.0 * worst(|f| f.strained_share),
+            100.0 * mean(|f| f.deep_share),
+            100.0 * worst(|f| f.deep_share),
+            mean(|f| f.strays_rms_mm),
+        );
+    }
+    table
+}
+
 /// A row a sequence; of each outfit at most `--rows`.
 fn view(args: &DatasetViewArgs) -> anyhow::Result<()> {
     let body = match &args.body {
@@ -104,7 +145,12 @@ fn view(args: &DatasetViewArgs) -> anyhow::Result<()> {
         None => builtin::body(),
     };
     let dataset = Dataset::open(&args.dataset, &body)?;
-    println!("{}", summary(&args.dataset, dataset.manifest()));
+    let manifest = dataset.manifest();
+    println!(
+        "{}{}",
+        summary(&args.dataset, manifest),
+        cloth_table(manifest)
+    );
     let mut shown: BTreeMap<&str, usize> = BTreeMap::new();
     let mut sheet = ContactSheet::new(MOMENTS + 1);
     for entry in &dataset.manifest().sequences {

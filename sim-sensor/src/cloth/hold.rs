@@ -14,6 +14,8 @@ use super::{
 const BELT_M: f32 = 0.028;
 /// Belts give a little; so does what keeps a shirt in its place on the neck and shoulders.
 const BELT_COMPLIANCE: f32 = 1e-4;
+/// Shirts slip under a belt when they are pulled.
+const TUCKED_COMPLIANCE: f32 = 1e-3;
 const NECK_COMPLIANCE: f32 = 3e-4;
 /// How far the seam of the neck and shoulders reaches from the neck's joint.
 const NECK_SEAM_M: f32 = 0.09;
@@ -34,6 +36,7 @@ pub(super) fn held(form: &Form, pattern: &Pattern, sheet: &Sheet) -> Vec<Held> {
     let waist_m = form.leg_height_m(0.0);
     let neck = form.joints[12];
     const WAIST: (&[u8], f32) = (&[0, 3], BELT_COMPLIANCE);
+    const TUCKED: (&[u8], f32) = (&[0, 3], TUCKED_COMPLIANCE);
     const NECK: (&[u8], f32) = (&[6, 9, 12, 13, 14], NECK_COMPLIANCE);
     let holding = |point: Vec3| match pattern.top {
         Top::Waist { above_hips_m } => (point.y > waist_m + above_hips_m - BELT_M).then_some(WAIST),
@@ -43,7 +46,7 @@ pub(super) fn held(form: &Form, pattern: &Pattern, sheet: &Sheet) -> Vec<Held> {
             if on_neck {
                 Some(NECK)
             } else {
-                under_belt.then_some(WAIST)
+                under_belt.then_some(TUCKED)
             }
         }
         Top::Hood => None,

@@ -36,6 +36,47 @@ impl Wear {
     }
 }
 
+/// Points deeper inside the body than this, and edges longer or shorter by more than this share, are counted.
+pub const DEEP_M: f32 = 0.002;
+pub const STRAINED: f32 = 0.15;
+
+/// How well clothes behaved over a number of frames.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Behaviour {
+    edges: u64,
+    strained: u64,
+    points: u64,
+    deep: u64,
+}
+
+impl Behaviour {
+    /// Counts a frame's strained edges.
+    pub fn add_strains(&mut self, wear: &Wear) {
+        for strain in wear.strains() {
+            self.edges += 1;
+            self.strained += u64::from(strain.abs() > STRAINED);
+        }
+    }
+
+    /// Counts a frame's points inside the body.
+    pub fn add_clearances(&mut self, wear: &Wear) {
+        for clearance_m in wear.clearances_m() {
+            self.points += 1;
+            self.deep += u64::from(clearance_m < -DEEP_M);
+        }
+    }
+
+    /// Share of all edges that were strained, 0 to 1.
+    pub fn strained_share(&self) -> f32 {
+        (self.strained as f64 / self.edges.max(1) as f64) as f32
+    }
+
+    /// Share of all points that were deep inside the body, 0 to 1.
+    pub fn deep_share(&self) -> f32 {
+        (self.deep as f64 / self.points.max(1) as f64) as f32
+    }
+}
+
 /// How far each point strays from its mean over frames, root mean square.
 pub fn strays_m(frames: &[Vec<Vec3>]) -> Vec<f32> {
     let count = frames.len().max(1) as f32;

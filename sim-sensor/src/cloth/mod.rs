@@ -11,6 +11,7 @@ mod envelope;
 mod form;
 mod hang;
 mod hold;
+mod let_out;
 mod measure;
 mod opening;
 mod pattern;
@@ -28,7 +29,7 @@ mod physics_tests;
 mod tests;
 
 pub use envelope::ClothedSurface;
-pub use measure::{rms_between_m, strays_m};
+pub use measure::{Behaviour, DEEP_M, STRAINED, rms_between_m, strays_m};
 pub use pattern::{ClothKind, Ease, Fabric, Front, Limbs, Pattern, Top};
 pub use sew::Garment;
 pub use sheet::Sheet;

@@ -144,7 +144,7 @@ impl ClothKind {
                 vec![close.undershirt(), tailor.suit_trousers(), tailor.blazer()]
             }
             Self::Skirt => {
-                let close = Tailor { fit: 0.3 + 0.4 * fit, ..tailor };
+                let close = Tailor { fit: 0.6 + 0.2 * fit, ..tailor };
                 vec![close.tucked_in(), tailor.skirt()]
             }
             Self::Dress => vec![tailor.dress()],
@@ -153,6 +153,11 @@ impl ClothKind {
 }
 
 impl Pattern {
+    /// Whether they are trousers of any length.
+    pub fn has_legs(&self) -> bool {
+        matches!(self.limbs, Limbs::Legs { .. })
+    }
+
     /// Whether it is a shirt that ends under a belt.
     pub fn is_tucked_in(&self) -> bool {
         self.hem.is_none() && matches!(self.limbs, Limbs::Arms { .. })
@@ -185,9 +190,9 @@ impl Tailor {
             hem: Some(self.random.between(3, 0.10, 0.18)),
             front: Front::Closed,
             ease: Ease {
-                trunk_m: self.by_fit(0.008, 0.042),
-                limb_m: self.by_fit(0.006, 0.026),
-                end_m: self.by_fit(0.007, 0.038),
+                trunk_m: self.by_fit(0.012, 0.042),
+                limb_m: self.by_fit(0.008, 0.026),
+                end_m: self.by_fit(0.009, 0.038),
                 hem_m: self.by_fit(0.008, 0.050),
                 flare: 0.0,
                 ribbed: false,
@@ -284,8 +289,8 @@ impl Tailor {
             hem: None,
             front: Front::Closed,
             ease: Ease {
-                trunk_m: self.by_fit(0.008, 0.018),
-                limb_m: self.by_fit(0.009, 0.024),
+                trunk_m: self.by_fit(0.012, 0.018),
+                limb_m: self.by_fit(0.011, 0.024),
                 end_m: self.by_fit(0.008, 0.024),
                 hem_m: 0.0,
                 flare: 0.0,
@@ -301,7 +306,7 @@ impl Tailor {
         Pattern {
             name: "suit trousers",
             ease: Ease {
-                trunk_m: self.by_fit(0.010, 0.018),
+                trunk_m: self.by_fit(0.012, 0.018),
                 limb_m: self.by_fit(0.018, 0.034),
                 end_m: self.by_fit(0.018, 0.036),
                 ..trousers.ease
@@ -347,7 +352,7 @@ impl Tailor {
             hem: Some(self.random.between(12, 0.80, 1.10)),
             front: Front::Closed,
             ease: Ease {
-                trunk_m: self.by_fit(0.012, 0.024),
+                trunk_m: self.by_fit(0.018, 0.026),
                 limb_m: 0.0,
                 end_m: 0.0,
                 hem_m: self.by_fit(0.020, 0.034),
@@ -367,8 +372,8 @@ impl Tailor {
             hem: Some(self.random.between(15, 0.85, 1.25)),
             front: Front::Closed,
             ease: Ease {
-                trunk_m: self.by_fit(0.006, 0.022),
-                limb_m: self.by_fit(0.006, 0.018),
+                trunk_m: self.by_fit(0.010, 0.022),
+                limb_m: self.by_fit(0.008, 0.018),
                 end_m: self.by_fit(0.008, 0.026),
                 hem_m: self.by_fit(0.012, 0.028),
                 flare: self.by_fit(0.15, 0.42),

@@ -91,22 +91,23 @@ struct Contact {
 }
 
 impl Cloth {
-    pub(super) fn new(garment: &Garment) -> Self {
+    /// A garment at rest; each of its edges is longer by a factor than it was cut.
+    pub(super) fn new(garment: &Garment, let_out: &[f32]) -> Self {
         let points = garment.rest.points.clone();
         let fabric = &garment.pattern.fabric;
         let at = |v: u32| points[v as usize];
         let edges = garment.rest.edges();
         // From top to bottom: what hangs is carried by what was just settled.
-        let mut downwards: Vec<_> = edges.iter().collect();
-        downwards.sort_by(|e, f| {
+        let mut downwards: Vec<_> = edges.iter().zip(let_out).collect();
+        downwards.sort_by(|(e, _), (f, _)| {
             let height = |edge: &Edge| at(edge.ends[0]).y + at(edge.ends[1]).y;
             height(f).total_cmp(&height(e))
         });
         let stretches = downwards
             .iter()
-            .map(|edge| Stretch {
+            .map(|&(edge, &let_out)| Stretch {
                 ends: edge.ends,
-                rest_m: at(edge.ends[0]).distance(at(edge.ends[1])),
+                rest_m: let_out * at(edge.ends[0]).distance(at(edge.ends[1])),
                 compliance: fabric.stretch_compliance,
                 lambda: 0.0,
             })

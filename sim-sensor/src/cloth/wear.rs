@@ -11,7 +11,8 @@ use glam::{Quat, Vec3};
 use super::{
     collider::{Collider, Obstacle},
     form::{Form, cut_pose},
-    pattern::{ClothKind, Limbs},
+    let_out::{let_out, trial_poses},
+    pattern::ClothKind,
     sew::{Garment, sew},
     sheet::Sheet,
     solver::Cloth,
@@ -108,14 +109,23 @@ impl Wear {
         let seat = Form::new(&person, &cut_pose(kind.legs_apart_rad(), SEAT_RAD));
         let mut garments: Vec<Garment> = Vec::new();
         for pattern in kind.patterns(fit, seed) {
-            let garment = if matches!(pattern.limbs, Limbs::Legs { .. }) {
+            let garment = if pattern.has_legs() {
                 sew(&seat, &pattern, &garments, &form)
             } else {
                 sew(&form, &pattern, &garments, &form)
             };
             garments.push(garment);
         }
-        let mut cloths: Vec<Cloth> = garments.iter().map(Cloth::new).collect();
+        let poses = trial_poses(&person);
+        let cloth = |garment: &Garment| {
+            let cut_on = if garment.pattern.has_legs() {
+                &seat
+            } else {
+                &form
+            };
+            Cloth::new(garment, &let_out(garment, cut_on, &person, &poses, fit))
+        };
+        let mut cloths: Vec<Cloth> = garments.iter().map(cloth).collect();
         let random = Randomness::new(seed, 0, 0xc10f);
         for (cloth, garment) in cloths.iter_mut().zip(&garments) {
             cloth.points.clone_from(&garment.laid_out);

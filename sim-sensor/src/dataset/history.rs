@@ -11,7 +11,10 @@ use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 use super::sequence::Sequence;
-use crate::{cloth::strays_m, truth::Truth};
+use crate::{
+    cloth::{Behaviour, strays_m},
+    truth::Truth,
+};
 
 /// What the clothes of a sequence do.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -22,6 +25,10 @@ pub struct ClothFacts {
     pub strays_rms_mm: f32,
     /// The same of the point that a tenth of them stray further than.
     pub strays_p90_mm: f32,
+    /// Share of edges longer or shorter than cut by more than 15 %, and of points deeper than 2 mm inside the minimal
+    /// body, 0 to 1, over the frames; points in every fourth.
+    pub strained_share: f32,
+    pub deep_share: f32,
     /// The least mean error (`D_f`) over two visits to the same poses that a function of the pose can have: half the
     /// mean distance of measured vertices to the other visit's surface, both ways. Only of test people.
     pub history_floor_cm: Option<f32>,
@@ -99,6 +106,7 @@ fn is_measured(weights: &VertexWeights) -> bool {
 /// How much a sequence's clothes move beyond what skinning says; `None` without garments of their own.
 pub(super) fn cloth_facts(
     sequence: &Sequence,
+    behaviour: &Behaviour,
     history_floor_cm: Option<f32>,
 ) -> Option<ClothFacts> {
     let of_cloth: Vec<usize> = (0..sequence.weights.len())
@@ -115,6 +123,8 @@ pub(super) fn cloth_facts(
     Some(ClothFacts {
         strays_rms_mm: (1e3 * (squares / strays.len() as f64).sqrt()) as f32,
         strays_p90_mm: 1e3 * p90,
+        strained_share: behaviour.strained_share(),
+        deep_share: behaviour.deep_share(),
         history_floor_cm,
     })
 }

@@ -12,7 +12,10 @@ use super::{
     history::{ClothFacts, cloth_facts, history_floor_cm, revisited},
     plan::{SequencePlan, Split},
 };
-use crate::truth::{GroundTruth, Truth};
+use crate::{
+    cloth::Behaviour,
+    truth::{GroundTruth, Truth},
+};
 
 /// Everything known about one person in one outfit doing one thing.
 #[derive(Clone, Debug, PartialEq)]
@@ -65,21 +68,28 @@ impl Sequence {
         };
         let mut gathered = Gathered::default();
         let mut visits = Vec::new();
+        let mut behaviour = Behaviour::default();
         for frame in 0..u64::from(plan.frames) {
             if !go_on() {
                 return None;
             }
-            let truth = truth.at(FrameId(frame));
+            let truth_now = truth.at(FrameId(frame));
             if revisited.contains(&frame) {
-                visits.push((frame, truth.clothed_in_world.clone()));
+                visits.push((frame, truth_now.clothed_in_world.clone()));
             }
-            gathered.add(truth);
+            gathered.add(truth_now);
+            if let Some(wear) = truth.scene().wear_after(FrameId(frame)) {
+                behaviour.add_strains(&wear);
+                if frame.is_multiple_of(4) {
+                    behaviour.add_clearances(&wear);
+                }
+            }
         }
         visits.reverse();
         let last = u64::from(plan.frames.saturating_sub(1));
         let floor_cm = history_floor_cm(truth, &gathered.weights, &visits, last);
         let mut sequence = gathered.finish(plan.clone(), truth);
-        sequence.cloth = cloth_facts(&sequence, floor_cm);
+        sequence.cloth = cloth_facts(&sequence, &behaviour, floor_cm);
         Some(sequence)
     }
 

@@ -1,0 +1,86 @@
+//! Room to move: what would be too short when the wearer squats, bends, reaches out or raises the arms is let out.
+//!
+//! Clothes cut to somebody who stands cannot follow everywhere: the back widens by a fifth when the arms reach
+//! forward, the seat when one sits down. Tailors leave ease there, knitters use yarn that gives; here single edges
+//! become longer.
+
+use effigy_registration::motion::{MotionPose, Routine};
+use glam::Vec3;
+
+use super::{form::Form, sew::Garment, sheet::Edge, wear::bones_of};
+use crate::person::Person;
+
+/// What is done while trying on, how often the tailor looks, and how many times.
+const TRIALS: [Routine; 4] = [
+    Routine::Squat,
+    Routine::Reach,
+    Routine::Bend,
+    Routine::RaiseArms,
+];
+const LOOKS_HZ: f32 = 4.0;
+const LOOKS: usize = 16;
+/// Edges get this much more than the weights say they need, in a tight and in a loose size: flesh widens where it
+/// folds, which weights do not know, and what is loose has room already.
+const EXTRA: [f32; 2] = [0.11, 0.04];
+/// Nothing is let out further.
+const MOST: f32 = 1.4;
+
+/// The poses clothes are tried on in.
+pub(super) fn trial_poses(person: &Person) -> Vec<MotionPose> {
+    let rest = person.rest_body();
+    let trial = |routine: Routine| {
+        let motion = routine.motion(&rest, LOOKS_HZ, 0);
+        motion.poses.into_iter().take(LOOKS)
+    };
+    TRIALS.into_iter().flat_map(trial).collect()
+}
+
+/// By what factor each edge of a garment is longer than it was cut on its form. `fit` goes from tight (0) to loose.
+pub(super) fn let_out(
+    garment: &Garment,
+    form: &Form,
+    person: &Person,
+    poses: &[MotionPose],
+    fit: f32,
+) -> Vec<f32> {
+    let (points, weights) = (&garment.rest.points, &garment.weights);
+    let at_rest: Vec<Vec3> = points
+        .iter()
+        .zip(weights)
+        .map(|(point, weights)| form.bones.blend(weights).inverse().transform_point3(*point))
+        .collect();
+    let across = |points: &[Vec3], edge: &Edge| {
+        let [a, b] = edge.ends.map(|v| points[v as usize]);
+        a - b
+    };
+    let edges = garment.rest.edges();
+    let cut: Vec<Vec3> = edges.iter().map(|edge| across(points, edge)).collect();
+    let mut longest_m: Vec<f32> = cut.iter().map(|cut| cut.length()).collect();
+    for pose in poses {
+        let bones = bones_of(person, &pose.theta);
+        let moved: Vec<Vec3> = at_rest
+            .iter()
+            .zip(weights)
+            .map(|(point, weights)| bones.blend(weights).transform_point3(*point))
+            .collect();
+        for (longest_m, edge) in longest_m.iter_mut().zip(&edges) {
+            *longest_m = longest_m.max(across(&moved, edge).length());
+        }
+    }
+    // Between a neck and a belt that hold it, what is too wide never comes to rest.
+    if garment.pattern.is_tucked_in() {
+        return vec![1.0; cut.len()];
+    }
+    let extra = 1.0 + EXTRA[0] + (EXTRA[1] - EXTRA[0]) * fit;
+    let factor = |(longest_m, cut): (f32, Vec3)| {
+        let needed = (extra * longest_m / cut.length().max(1e-6)).clamp(1.0, MOST);
+        // Shirts and skirts ride up instead of growing longer.
+        let sideways = if garment.pattern.has_legs() {
+            1.0
+        } else {
+            1.0 - cut.normalize_or_zero().y.powi(2)
+        };
+        1.0 + (needed - 1.0) * sideways
+    };
+    longest_m.into_iter().zip(cut).map(factor).collect()
+}
