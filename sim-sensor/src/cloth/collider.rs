@@ -1,6 +1,7 @@
 //! A moving surface that cloth cannot pass: the body, or a garment worn underneath.
 
 use effigy_fusion::mesh::{closest_point::ClosestPoint, normals::vertex_normals_into};
+use effigy_registration::smpl::VertexWeights;
 use glam::Vec3;
 
 use super::sheet::{NONE, Sheet};
@@ -46,15 +47,98 @@ pub(super) struct Obstacle<'a> {
     pub(super) deepest_m: f32,
     /// The furthest a point is pushed out in one step.
     pub(super) push_m: f32,
+    /// The garment's number, if it is one.
+    pub(super) layer: Option<usize>,
+    /// Only for sleeves of this arm, which nothing else of the body then pushes: an arm pressed against the trunk
+    /// keeps its sleeve.
+    pub(super) sleeve: Option<Arm>,
+}
+
+/// Which arm a sleeve is on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Arm {
+    Left,
+    Right,
+}
+
+impl Arm {
+    pub(super) const BOTH: [Self; 2] = [Self::Left, Self::Right];
+
+    /// The arm of a bone: upper arm, forearm or hand.
+    pub(super) fn of_bone(bone: u8) -> Option<Self> {
+        match bone {
+            16 | 18 | 20 | 22 => Some(Self::Left),
+            17 | 19 | 21 | 23 => Some(Self::Right),
+            _ => None,
+        }
+    }
+}
+
+/// A part of the body as an obstacle of its own.
+#[derive(Clone, Debug)]
+pub(super) struct Part {
+    pub(super) arm: Arm,
+    pub(super) collider: Collider,
+    /// The body's vertices it has.
+    vertices: Vec<u32>,
+}
+
+impl Part {
+    /// One arm of a body, from the shoulder to the fingers.
+    pub(super) fn arm(arm: Arm, body: &Sheet, skinning: &[VertexWeights]) -> Self {
+        let is_arms = |v: u32| Arm::of_bone(skinning[v as usize].main_bone()) == Some(arm);
+        let of_arm = body
+            .triangles
+            .iter()
+            .filter(|t| t.iter().all(|&v| is_arms(v)));
+        let mut vertices: Vec<u32> = of_arm.clone().flatten().copied().collect();
+        vertices.sort_unstable();
+        vertices.dedup();
+        let number = |v: &u32| vertices.binary_search(v).expect("it was collected") as u32;
+        let triangles = of_arm.map(|t| [number(&t[0]), number(&t[1]), number(&t[2])]);
+        let sheet = Sheet {
+            points: vertices.iter().map(|&v| body.points[v as usize]).collect(),
+            triangles: triangles.collect(),
+        };
+        Self { arm, collider: Collider::new(&sheet), vertices }
+    }
+
+    /// Jumps to where the body is.
+    pub(super) fn place(&mut self, body: &[Vec3]) {
+        let points: Vec<Vec3> = self.vertices.iter().map(|&v| body[v as usize]).collect();
+        self.collider.place(&points);
+    }
+
+    /// Moves on with the body.
+    pub(super) fn advance(&mut self, body: &[Vec3]) {
+        let points = self.vertices.iter().map(|&v| body[v as usize]);
+        self.collider.advance(points);
+    }
 }
 
 impl<'a> Obstacle<'a> {
     pub(super) fn body(collider: &'a Collider, thickness_m: f32) -> Self {
-        Self { collider, thickness_m, deepest_m: REACH_M, push_m: REACH_M }
+        Self {
+            collider,
+            thickness_m,
+            deepest_m: REACH_M,
+            push_m: REACH_M,
+            layer: None,
+            sleeve: None,
+        }
     }
 
-    pub(super) fn layer(collider: &'a Collider, thickness_m: f32) -> Self {
-        Self { collider, thickness_m, deepest_m: 0.010, push_m: 0.001 }
+    pub(super) fn part(part: &'a Part, thickness_m: f32) -> Self {
+        Self { sleeve: Some(part.arm), ..Self::body(&part.collider, thickness_m) }
+    }
+
+    pub(super) fn layer(number: usize, collider: &'a Collider, thickness_m: f32) -> Self {
+        Self {
+            deepest_m: 0.010,
+            push_m: 0.001,
+            layer: Some(number),
+            ..Self::body(collider, thickness_m)
+        }
     }
 }
 

@@ -18,6 +18,7 @@ mod pattern;
 mod remesh;
 mod sew;
 mod sheet;
+mod sleeve;
 mod solver;
 mod tape;
 mod wear;

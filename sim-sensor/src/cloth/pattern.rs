@@ -140,7 +140,7 @@ impl ClothKind {
             Self::PoloTrousers => vec![tailor.slim_trousers(), tailor.polo()],
             Self::HoodieTrousers => vec![tailor.slim_trousers(), tailor.hoodie()],
             Self::BlazerTrousers => {
-                let close = Tailor { fit: 0.6, ..tailor };
+                let close = Tailor { fit: 0.55, ..tailor };
                 vec![close.undershirt(), tailor.suit_trousers(), tailor.blazer()]
             }
             Self::Skirt => {
@@ -306,7 +306,7 @@ impl Tailor {
         Pattern {
             name: "suit trousers",
             ease: Ease {
-                trunk_m: self.by_fit(0.012, 0.018),
+                trunk_m: self.by_fit(0.010, 0.018),
                 limb_m: self.by_fit(0.018, 0.034),
                 end_m: self.by_fit(0.018, 0.036),
                 ..trousers.ease

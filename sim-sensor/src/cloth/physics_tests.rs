@@ -33,14 +33,19 @@ fn napkin(fabric: Fabric, turn: Quat, lift_m: f32) -> Cloth {
     let rest = square(7, 0.02, turn, lift_m);
     let pattern = Pattern { fabric, ..ClothKind::Dress.patterns(0.5, 1)[0] };
     let laid_out = rest.points.clone();
-    Cloth::new(&Garment {
-        pattern,
-        rest,
-        laid_out,
-        weights: Vec::new(),
-        home: Vec::new(),
-        held: Vec::new(),
-    })
+    Cloth::new(
+        &Garment {
+            pattern,
+            rest,
+            laid_out,
+            weights: Vec::new(),
+            home: Vec::new(),
+            held: Vec::new(),
+            arms: vec![None; 49],
+            rings: Vec::new(),
+        },
+        &[1.0; 1000],
+    )
 }
 
 fn fabric(friction: f32, drag: f32) -> Fabric {

@@ -5,6 +5,7 @@ use effigy_registration::smpl::VertexWeights;
 use glam::Vec3;
 
 use super::{
+    collider::Arm,
     cut::{clipped_by, covered, seam_height_m, tucked_hem_m},
     form::Form,
     hang::with_hanging_part,
@@ -13,6 +14,7 @@ use super::{
     pattern::{Front, Limbs, Pattern, Top},
     remesh::remeshed,
     sheet::{NONE, Sheet},
+    sleeve::{Ring, rings},
     weights,
 };
 use crate::person::{chart::Place, smoothstep};
@@ -41,6 +43,9 @@ pub struct Garment {
     /// The body's vertex nearest to each point when it was cut.
     pub home: Vec<u32>,
     pub(super) held: Vec<Held>,
+    /// The arm that each point is around.
+    pub(super) arms: Vec<Option<Arm>>,
+    pub(super) rings: Vec<Ring>,
 }
 
 /// Cuts and sews one garment on its form, over the others on theirs, and lays it out on the form on which
@@ -69,6 +74,11 @@ pub(super) fn sew(form: &Form, pattern: &Pattern, inner: &[Garment], put_on: &Fo
     }
     let weights = weights::diffused(form, &sheet, pattern);
     let held = held(form, pattern, &sheet);
+    let arms: Vec<Option<Arm>> = weights
+        .iter()
+        .map(|weights| Arm::of_bone(weights.main_bone()))
+        .collect();
+    let rings = rings(form, pattern, &sheet, &arms);
     let home = sheet
         .points
         .iter()
@@ -80,7 +90,16 @@ pub(super) fn sew(form: &Form, pattern: &Pattern, inner: &[Garment], put_on: &Fo
         *point = put_on.bones.blend(weights).transform_point3(at_rest);
     }
     Under::new(put_on, inner).push_out(&mut laid_out);
-    Garment { pattern: *pattern, rest: sheet, laid_out: laid_out.points, weights, home, held }
+    Garment {
+        pattern: *pattern,
+        rest: sheet,
+        laid_out: laid_out.points,
+        weights,
+        home,
+        held,
+        arms,
+        rings,
+    }
 }
 
 fn edge_for(area_m2: f32) -> f32 {

@@ -4,10 +4,11 @@
 use glam::Vec3;
 
 use super::{
-    collider::{Obstacle, REACH_M, Touch},
+    collider::{Arm, Obstacle, REACH_M, Touch},
     hold::Held,
     sew::Garment,
     sheet::{Edge, NONE},
+    sleeve::{ArmAxes, Ring},
 };
 
 const GRAVITY: Vec3 = Vec3::new(0.0, -9.81, 0.0);
@@ -15,6 +16,8 @@ const GRAVITY: Vec3 = Vec3::new(0.0, -9.81, 0.0);
 const MAX_SPEED_M_S: f32 = 12.0;
 /// Contacts are kept ready this far beyond touching.
 const MARGIN_M: f32 = 0.004;
+/// The furthest that anything but its own arm pushes a sleeve in one step.
+const SLEEVE_PUSH_M: f32 = 0.003;
 /// Cloth on cloth moves along with it, by this share in each step.
 const LAYER_CLING: f32 = 0.1;
 /// Edges bent more than this in the rest shape are folds that stay.
@@ -36,6 +39,13 @@ pub(super) struct Cloth {
     contacts: Vec<Contact>,
     /// For each obstacle and point.
     searches: Vec<Vec<Search>>,
+    /// The arm that each point is around.
+    sleeves: Vec<Option<Arm>>,
+    rings: Vec<Ring>,
+    /// Where arms are at the end of the step.
+    pub(super) arm_axes: ArmAxes,
+    /// What touches its own arm; nothing else of the body pushes it.
+    on_arm: Vec<bool>,
     friction: f32,
     drag: f32,
 }
@@ -84,8 +94,8 @@ struct Contact {
     offset_m: f32,
     moved: Vec3,
     pushed_m: f32,
-    /// What was touched, and where.
-    obstacle: usize,
+    /// What was touched, and where; a garment has a number.
+    layer: Option<usize>,
     triangle: u32,
     barycentric: Vec3,
 }
@@ -131,6 +141,10 @@ impl Cloth {
             held: garment.held.clone(),
             contacts: Vec::new(),
             searches: Vec::new(),
+            sleeves: garment.arms.clone(),
+            rings: garment.rings.clone(),
+            arm_axes: [[Vec3::ZERO; 4]; 2],
+            on_arm: Vec::new(),
             friction: fabric.friction,
             drag: fabric.drag,
         }
@@ -145,7 +159,7 @@ impl Cloth {
         }
     }
 
-    /// Moves by one small step; the first obstacle is the body.
+    /// Moves by one small step; arms come before the body, the body before garments.
     pub(super) fn step(&mut self, secs: f32, iterations: usize, obstacles: &[Obstacle<'_>]) {
         let kept = (1.0 - self.drag * secs).max(0.0);
         for v in 0..self.points.len() {
@@ -176,6 +190,9 @@ impl Cloth {
                 }
             }
             self.hold(per_square);
+            for ring in &self.rings {
+                ring.hold(&mut self.points, &self.arm_axes);
+            }
             for contact in &mut self.contacts {
                 contact.push(&mut self.points);
             }
@@ -193,25 +210,19 @@ impl Cloth {
             let velocity = &mut self.velocities[contact.point as usize];
             let away = (*velocity - contact.moved / secs).dot(contact.normal);
             *velocity -= contact.normal * away.max(0.0);
-            if contact.obstacle > 0 {
+            if contact.layer.is_some() {
                 *velocity = velocity.lerp(contact.moved / secs, LAYER_CLING);
             }
         }
     }
 
-    /// How the last step pushed garments underneath: which obstacle, at which triangle, and by how much.
+    /// How the last step pushed garments underneath: which one, at which triangle, and by how much.
     pub(super) fn reactions(&self) -> impl Iterator<Item = (usize, u32, Vec3, Vec3)> + '_ {
-        let pushing = self.contacts.iter();
-        pushing
-            .filter(|contact| contact.obstacle > 0 && contact.pushed_m > 0.0)
-            .map(|c| {
-                (
-                    c.obstacle,
-                    c.triangle,
-                    c.barycentric,
-                    -c.normal * c.pushed_m,
-                )
-            })
+        let pushing = self
+            .contacts
+            .iter()
+            .filter(|contact| contact.pushed_m > 0.0);
+        pushing.filter_map(|c| Some((c.layer?, c.triangle, c.barycentric, -c.normal * c.pushed_m)))
     }
 
     /// Where every point is outside of everything, without a push that would move it on.
@@ -226,10 +237,19 @@ impl Cloth {
 
     fn find_contacts(&mut self, obstacles: &[Obstacle<'_>]) {
         self.contacts.clear();
-        let searched = obstacles.iter().zip(&mut self.searches).enumerate();
-        for (number, (obstacle, searches)) in searched {
+        self.on_arm.clear();
+        self.on_arm.resize(self.points.len(), false);
+        for (obstacle, searches) in obstacles.iter().zip(&mut self.searches) {
             let near_m = obstacle.thickness_m + MARGIN_M;
             for (v, &point) in self.points.iter().enumerate() {
+                let is_for = match (obstacle.sleeve, obstacle.layer) {
+                    (Some(arm), _) => self.sleeves[v] == Some(arm),
+                    (None, None) => !self.on_arm[v],
+                    (None, Some(_)) => true,
+                };
+                if !is_for {
+                    continue;
+                }
                 let search = &mut searches[v];
                 // Far enough away last time, and neither has moved enough since.
                 let travel_m = obstacle.collider.travel_m;
@@ -251,14 +271,20 @@ impl Cloth {
                 let Some(touch) = touch.filter(touches) else {
                     continue;
                 };
+                self.on_arm[v] |= obstacle.sleeve.is_some();
+                // What the trunk pushes goes no further than its arm can stop it.
+                let push_m = match (self.sleeves[v], obstacle.sleeve) {
+                    (Some(_), None) => obstacle.push_m.min(SLEEVE_PUSH_M),
+                    _ => obstacle.push_m,
+                };
                 let out_m = touch.normal.dot(touch.point) + obstacle.thickness_m;
                 self.contacts.push(Contact {
                     point: v as u32,
                     normal: touch.normal,
-                    offset_m: out_m.min(touch.normal.dot(point) + obstacle.push_m),
+                    offset_m: out_m.min(touch.normal.dot(point) + push_m),
                     moved: touch.moved,
                     pushed_m: 0.0,
-                    obstacle: number,
+                    layer: obstacle.layer,
                     triangle: touch.triangle,
                     barycentric: touch.barycentric,
                 });

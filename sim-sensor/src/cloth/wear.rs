@@ -9,12 +9,13 @@ use effigy_registration::{
 use glam::{Quat, Vec3};
 
 use super::{
-    collider::{Collider, Obstacle},
+    collider::{Arm, Collider, Obstacle, Part},
     form::{Form, cut_pose},
     let_out::{let_out, trial_poses},
     pattern::ClothKind,
     sew::{Garment, sew},
     sheet::Sheet,
+    sleeve::ArmAxes,
     solver::Cloth,
 };
 use crate::{
@@ -82,6 +83,8 @@ pub struct Wear {
     laid_out: Arc<Vec<Vec<Vec3>>>,
     cloths: Vec<Cloth>,
     body: Collider,
+    /// Each arm once more, for its sleeve.
+    arms: [Part; 2],
     /// Each garment as an obstacle for those over it.
     layers: Vec<Collider>,
     pose: MotionPose,
@@ -140,6 +143,7 @@ impl Wear {
         let on = |g: &Garment| Collider::new(&g.rest.moved_to(&g.laid_out));
         let layers = garments.iter().map(on).collect();
         let body = Collider::new(&form.surface);
+        let arms = Arm::BOTH.map(|arm| Part::arm(arm, &form.surface, &form.skinning));
         Self {
             person,
             config,
@@ -148,6 +152,7 @@ impl Wear {
             laid_out: Arc::new(laid_out),
             cloths,
             body,
+            arms,
             layers,
             pose: cut,
         }
@@ -224,7 +229,7 @@ impl Wear {
         let parts = (secs / POSE_SECS - 1e-3).ceil().clamp(1.0, 240.0) as usize;
         let from = self.pose;
         for cloth in &mut self.cloths {
-            cloth.forget_searches(self.garments.len() + 1);
+            cloth.forget_searches(self.arms.len() + self.garments.len() + 1);
         }
         for part in 1..=parts {
             let next = if part == parts {
@@ -262,9 +267,14 @@ impl Wear {
         self.pose = *pose;
         let points = self.person.clothed_posed_vertices(&pose.theta, pose.trans);
         self.body.place(&points);
+        for arm in &mut self.arms {
+            arm.place(&points);
+        }
         let anchors = self.anchors(pose);
+        let arm_axes = self.arm_axes(pose);
         for (cloth, anchors) in self.cloths.iter_mut().zip(anchors) {
             cloth.anchors = anchors;
+            cloth.arm_axes = arm_axes;
         }
         for (layer, cloth) in self.layers.iter_mut().zip(&self.cloths) {
             layer.place(&cloth.points);
@@ -280,6 +290,7 @@ impl Wear {
             .map(|cloth| cloth.anchors.clone())
             .collect();
         let anchors_to = self.anchors(pose);
+        let (axes_from, axes_to) = (self.arm_axes(&self.pose), self.arm_axes(pose));
         let far_m = from
             .iter()
             .zip(&to)
@@ -296,14 +307,27 @@ impl Wear {
             let share = step as f32 / steps as f32;
             let between = from.iter().zip(&to).map(|(a, b)| a.lerp(*b, share));
             self.body.advance(between);
+            for arm in &mut self.arms {
+                arm.advance(&self.body.now);
+            }
             for (number, cloth) in self.cloths.iter_mut().enumerate() {
                 for (i, anchor) in cloth.anchors.iter_mut().enumerate() {
                     *anchor = anchors_from[number][i].lerp(anchors_to[number][i], share);
                 }
+                cloth.arm_axes = std::array::from_fn(|arm| {
+                    std::array::from_fn(|k| axes_from[arm][k].lerp(axes_to[arm][k], share))
+                });
             }
             self.step_cloths(secs / steps as f32);
         }
         self.pose = *pose;
+    }
+
+    /// Where a pose has shoulders, elbows, wrists and hands.
+    fn arm_axes(&self, pose: &MotionPose) -> ArmAxes {
+        let (_, joints) = BoneTransforms::from_pose(&pose.theta, &self.person.rest_joints);
+        [[16, 18, 20, 22], [17, 19, 21, 23]]
+            .map(|arm| arm.map(|joint: usize| joints[joint] + pose.trans))
     }
 
     /// Where a pose carries what is held, for each garment.
@@ -321,18 +345,17 @@ impl Wear {
         let count = self.cloths.len();
         let iterations = self.config.iterations + LAYER_ITERATIONS * count.saturating_sub(2);
         for number in 0..count {
-            let mut obstacles = vec![Obstacle::body(&self.body, self.config.skin_m)];
-            for inner in &self.layers[..number] {
-                obstacles.push(Obstacle::layer(inner, self.config.layer_m));
+            let mut obstacles = skin(&self.arms, &self.body, self.config.skin_m);
+            for (below, layer) in self.layers[..number].iter().enumerate() {
+                obstacles.push(Obstacle::layer(below, layer, self.config.layer_m));
             }
             self.cloths[number].step(secs, iterations, &obstacles);
             let (inner, outer) = self.cloths.split_at_mut(number);
-            for (obstacle, triangle, barycentric, push) in outer[0].reactions() {
-                // The body is the first obstacle; garments follow from the innermost.
-                let corners = self.layers[obstacle - 1].corners(triangle);
+            for (below, triangle, barycentric, push) in outer[0].reactions() {
+                let corners = self.layers[below].corners(triangle);
                 let push = REACTION * push.clamp_length_max(MAX_REACTION_M);
                 for (corner, part) in corners.into_iter().zip(barycentric.to_array()) {
-                    inner[obstacle - 1].points[corner as usize] += push * part;
+                    inner[below].points[corner as usize] += push * part;
                 }
             }
             if number + 1 < count {
@@ -345,8 +368,8 @@ impl Wear {
     /// Removes what little the last step left inside of something.
     fn finish(&mut self) {
         for number in 0..self.cloths.len() {
-            let body = Obstacle::body(&self.body, 0.7 * self.config.skin_m);
-            self.cloths[number].push_out(&[body]);
+            let skin = skin(&self.arms, &self.body, 0.7 * self.config.skin_m);
+            self.cloths[number].push_out(&skin);
             let points = self.cloths[number].points.clone();
             self.layers[number].place(&points);
         }
@@ -370,6 +393,16 @@ impl Wear {
         }
         self.place_body(pose);
     }
+}
+
+/// The body as obstacles: arms for their sleeves, then all of it.
+fn skin<'a>(arms: &'a [Part; 2], body: &'a Collider, thickness_m: f32) -> Vec<Obstacle<'a>> {
+    let [left, right] = arms;
+    vec![
+        Obstacle::part(left, thickness_m),
+        Obstacle::part(right, thickness_m),
+        Obstacle::body(body, thickness_m),
+    ]
 }
 
 /// The body's bones in a pose.
