@@ -1,10 +1,6 @@
 //! Effigy: one depth camera in, a live avatar out.
 
-#![expect(
-    clippy::print_stdout,
-    clippy::print_stderr,
-    reason = "a program talks to its user"
-)]
+#![expect(clippy::print_stderr, reason = "a program talks to its user")]
 
 mod cli;
 mod commands;
@@ -14,6 +10,7 @@ mod machine;
 mod pipeline;
 mod progress;
 mod report;
+mod say;
 #[cfg(feature = "window")]
 mod window;
 

@@ -257,6 +257,24 @@ fn settings_that_mean_nothing_are_refused_with_what_was_expected() {
     assert_fails(&effigy(here, &none), USAGE, &["1 to 64"]);
 }
 
+#[test]
+fn a_reader_who_has_heard_enough_is_no_reason_to_fail() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    simulate(here, "s.mcap", "1");
+    let mut run = Command::new(env!("CARGO_BIN_EXE_effigy"))
+        .current_dir(here)
+        .args(["info", "s.mcap"])
+        .stderr(Stdio::piped())
+        .stdout(Stdio::piped())
+        .spawn()
+        .unwrap();
+    drop(run.stdout.take());
+    let output = run.wait_with_output().unwrap();
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success() && said.is_empty(), "{said}");
+}
+
 #[cfg(unix)]
 #[test]
 fn ctrl_c_ends_a_run_in_order_even_while_it_waits_for_an_avatar() {

@@ -28,6 +28,7 @@ use crate::{
         settings::Settings,
     },
     report::{FineTuneFigures, FrameCounts, Latency, Report, SCHEMA},
+    say::say,
 };
 
 pub(crate) struct Input {
@@ -81,7 +82,7 @@ fn run_chain(
     controls: &Controls,
 ) -> anyhow::Result<()> {
     let report = report_of(input, args, window, controls)?;
-    println!("{report}\nwritten to {}", args.out.display());
+    say!("{report}\nwritten to {}", args.out.display());
     Ok(())
 }
 

@@ -15,6 +15,7 @@ use crate::{
     cli::{CapeGender, DatasetArgs, DatasetMakeArgs, DatasetViewArgs, DatasetWhat, ImportCapeArgs},
     interrupt,
     progress::Progress,
+    say::say,
 };
 
 /// Moments of a sequence that a sheet shows.
@@ -44,10 +45,10 @@ fn make_dataset(args: &DatasetMakeArgs) -> anyhow::Result<()> {
     let made = make(&plan, &builtin::body(), &args.out, &go_on)?;
     progress.finish();
     let Some(manifest) = made else {
-        println!("stopped; the same command goes on from here");
+        say!("stopped; the same command goes on from here");
         return Ok(());
     };
-    println!(
+    say!(
         "{}{}",
         summary(&args.out, &manifest),
         cloth_table(&manifest)
@@ -72,10 +73,10 @@ fn import(args: &ImportCapeArgs) -> anyhow::Result<()> {
     let imported = import_cape(&args.release, &body, &choice, &args.out, &go_on)?;
     progress.finish();
     let Some(manifest) = imported else {
-        println!("stopped; the same command goes on from here");
+        say!("stopped; the same command goes on from here");
         return Ok(());
     };
-    println!("{}", summary(&args.out, &manifest));
+    say!("{}", summary(&args.out, &manifest));
     Ok(())
 }
 
@@ -146,7 +147,7 @@ fn view(args: &DatasetViewArgs) -> anyhow::Result<()> {
     };
     let dataset = Dataset::open(&args.dataset, &body)?;
     let manifest = dataset.manifest();
-    println!(
+    say!(
         "{}{}",
         summary(&args.dataset, manifest),
         cloth_table(manifest)
@@ -161,7 +162,7 @@ fn view(args: &DatasetViewArgs) -> anyhow::Result<()> {
         }
     }
     sheet.save(&args.out)?;
-    println!("{}", args.out.display());
+    say!("{}", args.out.display());
     Ok(())
 }
 

@@ -8,6 +8,7 @@ use effigy_registration::motion::{self, RestBody};
 
 use super::chain::body_model;
 use crate::cli::ExportArgs;
+use crate::say::say;
 
 pub(crate) fn run(args: &ExportArgs) -> anyhow::Result<()> {
     let body = body_model(args.body.as_deref())?;
@@ -25,7 +26,7 @@ pub(crate) fn run(args: &ExportArgs) -> anyhow::Result<()> {
         &GlbOptions { motion: motion.as_ref(), ..GlbOptions::default() },
     )?;
     let played = motion.map_or(0.0, |motion| motion.duration_secs());
-    println!(
+    say!(
         "{}: {} vertices, {played:.1} s of motion",
         args.glb.display(),
         avatar.topology.vertices_in_unit.len()

@@ -8,6 +8,7 @@ use crate::{
     cli::{ImportArgs, ImportKind},
     interrupt,
     progress::Progress,
+    say::say,
 };
 
 pub(crate) fn run(args: &ImportArgs) -> anyhow::Result<()> {
@@ -28,6 +29,6 @@ pub(crate) fn run(args: &ImportArgs) -> anyhow::Result<()> {
     }
     progress.finish();
     let summary = writer.finish()?;
-    println!("{}: {} frames", args.out.display(), summary.frames);
+    say!("{}: {} frames", args.out.display(), summary.frames);
     Ok(())
 }

@@ -8,12 +8,12 @@ use effigy_capture::{recording, source};
 use effigy_registration::BodyModel;
 use serde_json::{Value, json};
 
-use crate::{cli::InfoArgs, files};
+use crate::{cli::InfoArgs, files, say::say};
 
 pub(crate) fn run(args: &InfoArgs) -> anyhow::Result<()> {
     let facts = facts(&args.input)?;
     let text = serde_json::to_string_pretty(&facts).context("facts are plain data")?;
-    println!("{text}");
+    say!("{text}");
     if let Some(path) = &args.json {
         files::write(path, text + "\n")?;
     }

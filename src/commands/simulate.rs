@@ -8,7 +8,7 @@ use effigy_registration::smpl::builtin;
 use effigy_sim_sensor::SimulatedSensor;
 
 use super::scene::{SECONDS, scenario};
-use crate::{cli::SimulateArgs, interrupt, progress::Progress};
+use crate::{cli::SimulateArgs, interrupt, progress::Progress, say::say};
 
 /// Where a recording keeps the scenario it was made from: the truth, to be computed again.
 pub(crate) const SCENARIO_KEY: &str = "effigy.scenario";
@@ -29,6 +29,6 @@ pub(crate) fn run(args: &SimulateArgs) -> anyhow::Result<()> {
     }
     progress.finish();
     let summary = writer.finish()?;
-    println!("{}: {} frames", args.out.display(), summary.frames);
+    say!("{}: {} frames", args.out.display(), summary.frames);
     Ok(())
 }

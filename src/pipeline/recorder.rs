@@ -7,6 +7,8 @@ use effigy_capture::{Calibration, Frame, recording::RecordingWriter};
 
 use super::schedule::{DECISION_EVENT, Decided, Decision};
 
+use crate::say::say;
+
 /// Whether the chain waits for the disk.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum WhenDiskIsSlow {
@@ -48,7 +50,7 @@ impl Recorder {
     /// Closes the file and says what is in it.
     pub(crate) fn finish(self) -> anyhow::Result<()> {
         let summary = self.writer.finish()?;
-        println!(
+        say!(
             "{}: {} frames, {:.0} MB",
             summary.path.display(),
             summary.frames,

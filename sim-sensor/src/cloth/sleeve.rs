@@ -55,6 +55,24 @@ pub(super) fn rings(
 impl Ring {
     /// Moves the ring as a whole back around its arm if it has left it.
     pub(super) fn hold(&self, points: &mut [Vec3], axes: &ArmAxes) {
+        let aside = self.aside(points, axes);
+        let excess_m = aside.length() - self.most_m;
+        if excess_m > 0.0 {
+            let back = -aside.normalize_or_zero() * excess_m;
+            for &v in &self.points {
+                points[v as usize] += back;
+            }
+        }
+    }
+
+    /// How far the ring is off its arm beyond what it may be, in metres; negative around it.
+    #[cfg(test)]
+    pub(super) fn excess_m(&self, points: &[Vec3], axes: &ArmAxes) -> f32 {
+        self.aside(points, axes).length() - self.most_m
+    }
+
+    /// From the arm's middle to the ring's.
+    fn aside(&self, points: &[Vec3], axes: &ArmAxes) -> Vec3 {
         let sum: Vec3 = self.points.iter().map(|&v| points[v as usize]).sum();
         let middle = sum / self.points.len() as f32;
         let axis = &axes[self.arm as usize];
@@ -66,14 +84,7 @@ impl Ring {
                     .total_cmp(&b.distance_squared(middle))
             })
             .unwrap_or(middle);
-        let aside = middle - nearest;
-        let excess_m = aside.length() - self.most_m;
-        if excess_m > 0.0 {
-            let back = -aside.normalize_or_zero() * excess_m;
-            for &v in &self.points {
-                points[v as usize] += back;
-            }
-        }
+        middle - nearest
     }
 }
 

@@ -324,7 +324,7 @@ impl Wear {
     }
 
     /// Where a pose has shoulders, elbows, wrists and hands.
-    fn arm_axes(&self, pose: &MotionPose) -> ArmAxes {
+    pub(super) fn arm_axes(&self, pose: &MotionPose) -> ArmAxes {
         let (_, joints) = BoneTransforms::from_pose(&pose.theta, &self.person.rest_joints);
         [[16, 18, 20, 22], [17, 19, 21, 23]]
             .map(|arm| arm.map(|joint: usize| joints[joint] + pose.trans))

@@ -152,3 +152,43 @@ fn population_normals_belong_to_the_canonical_surface() {
     let ankles = people[0].person.body.joints(&sample.minimal_canonical);
     assert!(ankles[7].distance(ankles[8]) > 0.9, "star pose");
 }
+
+/// Over naked skin, on somebody who wears shoes and hair only.
+#[test]
+fn hair_stands_off_the_skull_shoes_have_soles_and_hands_stay_bare() {
+    let seed = 5;
+    let betas = sample_betas(&builtin::body(), seed);
+    let person = Person::new(builtin::body(), betas, Outfit::UNDER, seed);
+    let still = [Vec3::ZERO; JOINT_COUNT];
+    let (bare, worn) = (
+        person.minimal_zero_pose(&still),
+        person.clothed_zero_pose(&still),
+    );
+    let off_m: Vec<f32> = bare
+        .iter()
+        .zip(&worn)
+        .map(|(b, w)| b.distance(*w))
+        .collect();
+    let of_bone = |bones: &[u8], v: usize| bones.contains(&person.body.skinning[v].main_bone());
+    let on =
+        |bones: &[u8]| -> Vec<usize> { (0..bare.len()).filter(|&v| of_bone(bones, v)).collect() };
+    // Hair: 14 mm, uneven by a quarter; the crown has it and the chin does not.
+    let head = on(&[15]);
+    let highest = |v: &&usize| (bare[**v].y * 1e6) as i64;
+    let crown = *head.iter().max_by_key(highest).unwrap();
+    let chin = *head.iter().min_by_key(highest).unwrap();
+    assert!((0.008..0.020).contains(&off_m[crown]), "{} m", off_m[crown]);
+    assert!(off_m[chin] < 1e-4, "{} m", off_m[chin]);
+    // Soles: 16 mm under the foot, and flat.
+    let lowest = |points: &[Vec3]| {
+        let feet = on(&[7, 8, 10, 11]).into_iter();
+        feet.map(|v| points[v].y).fold(f32::MAX, f32::min)
+    };
+    let sole_m = lowest(&bare) - lowest(&worn);
+    assert!((0.012..0.020).contains(&sole_m), "{sole_m} m");
+    // Hands and forearms: skin.
+    for v in on(&[18, 19, 20, 21, 22, 23]) {
+        assert!(off_m[v] < 1e-6, "vertex {v} is {} m off the skin", off_m[v]);
+    }
+    assert!(on(&[20, 21, 22, 23]).len() > 200, "hands have fingers");
+}

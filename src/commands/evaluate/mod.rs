@@ -16,6 +16,7 @@ use crate::{
     machine::Machine,
     pipeline::settings::Settings,
     progress::Progress,
+    say::say,
 };
 
 /// Changes when a key changes its meaning.
@@ -56,7 +57,7 @@ fn evaluate_tracking(args: &EvaluateTrackingArgs) -> anyhow::Result<()> {
         },
     )?;
     progress.finish();
-    print!("{table}");
+    say!("{}", table.to_string().trim_end());
     let report =
         Report { schema: SCHEMA, machine: Machine::this(), quick: args.quick, table: &table };
     files::write_json(&args.json, &report)

@@ -3,6 +3,7 @@
 use effigy_avatar::meta::{PriorConfig, time_one_step};
 
 use crate::pipeline::clock::Clock;
+use crate::say::say;
 
 /// Prints the arithmetic and the time of `effigy train sdf`.
 pub(super) fn say_field(config: &PriorConfig) {
@@ -35,7 +36,7 @@ fn say(config: &PriorConfig, frames: f64) {
     let start = Clock::start();
     let timed = time_one_step(config);
     let secs = start.secs() / timed as f64 * frames;
-    println!(
+    say!(
         "about {:.1} TFLOP in the field, {:.1} minutes on this machine as busy as it is now",
         frames * per_frame / 1e12,
         secs / 60.0

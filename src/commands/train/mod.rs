@@ -27,6 +27,7 @@ use crate::{
     cli::{TrainArgs, TrainHyperArgs, TrainPreset, TrainShared, TrainWhat},
     files,
     pipeline::settings::Settings,
+    say::say,
 };
 
 pub(crate) fn run(args: &TrainArgs) -> anyhow::Result<()> {
@@ -99,7 +100,7 @@ impl<'a> Job<'a> {
         files::check_writable(&checkpoint.with_extension("partial"))?;
         let body = builtin::body();
         let (people, judges) = people(args, &body)?;
-        println!(
+        say!(
             "{} people to learn from in cloth, mirror images included; {} to judge; seed {}",
             people.cloth.as_ref().map_or(0, ClothPeople::count),
             judges.len(),
@@ -144,7 +145,7 @@ impl<'a> Job<'a> {
     ) -> anyhow::Result<()> {
         let checkpoint = self.args.checkpoint();
         let Some(mut network) = trained else {
-            println!("stopped; `--resume` goes on from {}", checkpoint.display());
+            say!("stopped; `--resume` goes on from {}", checkpoint.display());
             return Ok(());
         };
         let data = &self.people.described;
@@ -156,7 +157,7 @@ impl<'a> Job<'a> {
         let bytes = network.to_bytes(precision)?;
         files::write(&self.args.out, &bytes)?;
         fs::remove_file(&checkpoint).ok();
-        println!("{}: {} bytes", self.args.out.display(), bytes.len());
+        say!("{}: {} bytes", self.args.out.display(), bytes.len());
         Ok(())
     }
 }

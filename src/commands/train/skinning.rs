@@ -16,6 +16,7 @@ use crate::{
     files, interrupt,
     pipeline::clock::Clock,
     progress::Progress,
+    say::say,
 };
 
 /// What our kernels reach in this training on one core (an Intel Xeon with AVX-512), data included; for the estimate
@@ -49,7 +50,7 @@ pub(crate) fn run(args: &TrainSkinningArgs) -> anyhow::Result<()> {
     let dataset = Dataset::open(&args.data, &body)?;
     let clouds = Clouds::load(&dataset, config.points, config.seed)?;
     let flops = training_flops(&config);
-    println!(
+    say!(
         "{} training and {} held-out sequences; {} steps of {} clouds, {:.0} TFLOP, about {:.0} processor minutes",
         clouds.training_count(),
         clouds.held_out_count(),
@@ -63,7 +64,7 @@ pub(crate) fn run(args: &TrainSkinningArgs) -> anyhow::Result<()> {
     let mut looked = 0;
     let mut on_progress = |now: &SkinningProgress<'_>| {
         for look in &now.looks[looked.min(now.looks.len())..] {
-            println!("{}", line(look));
+            say!("{}", line(look));
         }
         looked = now.looks.len();
         let [inverse, forward, labels] = now.losses;
@@ -77,7 +78,7 @@ pub(crate) fn run(args: &TrainSkinningArgs) -> anyhow::Result<()> {
     };
     let trained = train_skinning(&body, &clouds, &config, Some(&checkpoint), &mut on_progress)?;
     let Some((mut networks, looks)) = trained else {
-        println!("stopped; `--resume` goes on from {}", checkpoint.display());
+        say!("stopped; `--resume` goes on from {}", checkpoint.display());
         return Ok(());
     };
     networks.provenance.training = format!(
@@ -90,7 +91,7 @@ pub(crate) fn run(args: &TrainSkinningArgs) -> anyhow::Result<()> {
     files::write(&args.out, &bytes)?;
     write_curve(&args.out.with_extension("curve.csv"), &looks)?;
     fs::remove_file(&checkpoint).ok();
-    println!(
+    say!(
         "{}: {} bytes, {:.0} s",
         args.out.display(),
         bytes.len(),

@@ -171,7 +171,8 @@ fn every_sensor_sees_the_surface_from_where_its_calibration_says() {
     let dataset = made(&plan(), folder.path());
     let sequence = dataset.load(&dataset.manifest().sequences[1]).unwrap();
     let surface = ClosestPoint::from_mesh(&sequence.posed_mesh(1)).unwrap();
-    for (sensor, yaw_rad) in SensorPreset::ALL.into_iter().zip([0.0, 0.8, 2.4, -1.6]) {
+    let yaws_rad = [0.0, 0.8, 2.4, -1.6].into_iter().cycle();
+    for (sensor, yaw_rad) in SensorPreset::ALL.into_iter().zip(yaws_rad) {
         let ideal = SensorShot { sensor, yaw_rad, noise: Noise::None, room: Room::Empty, seed: 7 };
         let (frame, calibration) = sequence.sensor_frame(1, &ideal);
         let world_from_camera = calibration.world_from_camera.unwrap();
@@ -255,6 +256,10 @@ fn a_skirt_knows_where_it_came_from_and_the_manifest_says_by_how_much() {
     let floor_cm = facts.history_floor_cm.unwrap();
     // A skirt of 60 cm swings by centimetres and is measured with the trunk, which does not.
     assert!((0.02..2.0).contains(&floor_cm), "{floor_cm} cm");
+    assert!(
+        facts.strained_share < 0.01 && facts.deep_share < 1e-3,
+        "{facts:?}"
+    );
     assert!(
         facts.strays_p90_mm > facts.strays_rms_mm && facts.strays_rms_mm > 1.0,
         "{facts:?}"

@@ -38,6 +38,7 @@ use crate::{
     files, interrupt,
     pipeline::{clock::Clock, settings::Settings},
     progress::Progress,
+    say::say,
 };
 
 /// Of a quick look.
@@ -181,7 +182,7 @@ impl Evaluation<'_> {
     fn finish(&self) -> anyhow::Result<()> {
         self.keep()?;
         let table = markdown(&self.rows) + &bars::markdown(&self.rows);
-        print!("{table}");
+        say!("{}", table.trim_end());
         match &self.args.md {
             Some(path) => files::write(path, table),
             None => Ok(()),

@@ -29,6 +29,7 @@ use crate::{
     machine::Machine,
     pipeline::{clock::Clock, settings::Settings},
     progress::Progress,
+    say::say,
 };
 
 /// Changes when a key changes its meaning.
@@ -130,7 +131,7 @@ pub(super) fn run(args: &EvaluateSkinningArgs) -> anyhow::Result<()> {
     progress.finish();
     let rows = rows(&sums);
     let table = markdown(&rows);
-    print!("{table}");
+    say!("{}", table.trim_end());
     if let Some(path) = &args.md {
         files::write(path, &table)?;
     }
