@@ -18,6 +18,9 @@ const MAX_SPEED_M_S: f32 = 12.0;
 const MARGIN_M: f32 = 0.004;
 /// The furthest that anything but its own arm pushes a sleeve in one step.
 const SLEEVE_PUSH_M: f32 = 0.003;
+/// What each step ends with: rounds, and the share by which an edge may be longer or shorter then.
+const STRAIN_ROUNDS: usize = 6;
+const STRAIN_LIMIT: f32 = 0.08;
 /// Cloth on cloth moves along with it, by this share in each step.
 const LAYER_CLING: f32 = 0.1;
 /// Edges bent more than this in the rest shape are folds that stay.
@@ -197,6 +200,7 @@ impl Cloth {
                 contact.push(&mut self.points);
             }
         }
+        self.limit_strain();
         self.rub();
         for v in 0..self.points.len() {
             self.velocities[v] = (self.points[v] - self.before[v]) / secs;
@@ -292,6 +296,19 @@ impl Cloth {
         }
     }
 
+    /// Brings edges that are still far too long or too short to the limit (Provot, *Deformation constraints in a
+    /// mass-spring model*, 1995): the rounds above share a pull out over few edges only.
+    fn limit_strain(&mut self) {
+        for _ in 0..STRAIN_ROUNDS {
+            for stretch in &self.stretches {
+                stretch.limit(&mut self.points);
+            }
+            for contact in &mut self.contacts {
+                contact.push(&mut self.points);
+            }
+        }
+    }
+
     /// Draws what is held towards where the trunk carries it.
     fn hold(&mut self, per_square: f32) {
         for (held, &at) in self.held.iter().zip(&self.anchors) {
@@ -340,6 +357,22 @@ impl Stretch {
         let push = apart * (delta / length_m);
         points[a] += push;
         points[b] -= push;
+    }
+}
+
+impl Stretch {
+    #[inline]
+    fn limit(&self, points: &mut [Vec3]) {
+        let [a, b] = self.ends.map(|v| v as usize);
+        let apart = points[a] - points[b];
+        let length_m = apart.length();
+        let most_m = self.rest_m * STRAIN_LIMIT;
+        let excess_m = (length_m - self.rest_m).abs() - most_m;
+        if excess_m > 0.0 && length_m > 1e-7 {
+            let push = apart * (0.5 * excess_m.copysign(self.rest_m - length_m) / length_m);
+            points[a] += push;
+            points[b] -= push;
+        }
     }
 }
 
