@@ -102,6 +102,11 @@ fn summary(folder: &Path, manifest: &Manifest) -> String {
     )
 }
 
+const CLOTH_HEADER: &str = "
+| clothes | sequences | strained edges, mean (worst) | deep in the body, mean (worst) | strays, rms | history floor |
+|---|---|---|---|---|---|
+";
+
 /// What the clothes of each outfit do, over its sequences; empty where none are simulated.
 fn cloth_table(manifest: &Manifest) -> String {
     let mut outfits: BTreeMap<(&str, &str), Vec<ClothFacts>> = BTreeMap::new();
@@ -111,11 +116,8 @@ fn cloth_table(manifest: &Manifest) -> String {
             outfits.entry(outfit).or_default().push(facts);
         }
     }
-    let mut table = String::new();
+    let mut rows = Vec::new();
     for ((split, outfit), facts) in outfits {
-        if table.is_empty() {
-            table += "\n| clothes | sequences | strained edges, mean (worst) | deep in the body, mean (worst) | strays, rms | history floor |\n|---|---|---|---|---|---|";
-        }
         let mean = |of: fn(&ClothFacts) -> f32| {
             facts.iter().map(of).sum::<f32>() / facts.len().max(1) as f32
         };
@@ -126,17 +128,20 @@ fn cloth_table(manifest: &Manifest) -> String {
         } else {
             format!("{:.2} cm", floors.iter().sum::<f32>() / floors.len() as f32)
         };
-        table += &format!(
-            "\n| {split} `{outfit}` | {} | {:.2} ({:.2}) % | {:.3} ({:.3}) % | {:.1} mm | {floor} |",
+        rows.push(format!(
+            "| {split} `{outfit}` | {} | {:.2} ({:.2}) % | {:.3} ({:.3}) % | {:.1} mm | {floor} |",
             facts.len(),
             100.0 * mean(|f| f.strained_share),
             100.0 * worst(|f| f.strained_share),
             100.0 * mean(|f| f.deep_share),
             100.0 * worst(|f| f.deep_share),
             mean(|f| f.strays_rms_mm),
-        );
+        ));
     }
-    table
+    if rows.is_empty() {
+        return String::new();
+    }
+    format!("{CLOTH_HEADER}{}", rows.join("\n"))
 }
 
 /// A row a sequence; of each outfit at most `--rows`.
