@@ -148,8 +148,9 @@ impl Findings {
     fn look_at(&mut self, wear: &Wear, number: usize) {
         self.behaviour.add_strains(wear);
         if number.is_multiple_of(3) {
-            self.behaviour.add_clearances(wear);
-            self.clearances_m.extend(wear.clearances_m());
+            let clearances_m = wear.clearances_m();
+            self.behaviour.add_clearances(&clearances_m);
+            self.clearances_m.extend(clearances_m);
             self.offsets_m.push(wear.offsets_in_star_pose_m());
         }
     }

@@ -88,7 +88,8 @@ impl Scene {
         })
     }
 
-    fn worn_at<T>(&self, frame: FrameId, look: impl FnOnce(&Wear) -> T) -> Option<T> {
+    /// The clothes in a frame, looked at where they are.
+    pub(crate) fn worn_at<T>(&self, frame: FrameId, look: impl FnOnce(&Wear) -> T) -> Option<T> {
         let tape = self.cloth.as_ref()?;
         // A panic elsewhere left the tape between frames at worst; it starts from a kept state again.
         let mut tape = tape.lock().unwrap_or_else(PoisonError::into_inner);

@@ -7,8 +7,7 @@ use effigy_avatar::{
 use effigy_registration::motion::{self, RestBody};
 
 use super::chain::body_model;
-use crate::cli::ExportArgs;
-use crate::say::say;
+use crate::{cli::ExportArgs, say::say};
 
 pub(crate) fn run(args: &ExportArgs) -> anyhow::Result<()> {
     let body = body_model(args.body.as_deref())?;

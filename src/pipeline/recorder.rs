@@ -6,7 +6,6 @@ use anyhow::Context as _;
 use effigy_capture::{Calibration, Frame, recording::RecordingWriter};
 
 use super::schedule::{DECISION_EVENT, Decided, Decision};
-
 use crate::say::say;
 
 /// Whether the chain waits for the disk.

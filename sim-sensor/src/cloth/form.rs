@@ -74,6 +74,11 @@ impl Form {
         }
     }
 
+    /// A point that moves with these bones, taken from this pose to the zero pose.
+    pub(super) fn at_rest(&self, point: Vec3, weights: &VertexWeights) -> Vec3 {
+        self.bones.blend(weights).inverse().transform_point3(point)
+    }
+
     /// A value of the nearest point of the body, interpolated.
     pub(super) fn blend(&self, hit: &Hit, value: impl Fn(usize) -> f32) -> f32 {
         let corners = self.surface.triangles[hit.triangle as usize];

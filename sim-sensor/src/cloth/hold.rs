@@ -14,9 +14,9 @@ use super::{
 const BELT_M: f32 = 0.028;
 /// Belts give a little; so does what keeps a shirt in its place on the neck and shoulders.
 const BELT_COMPLIANCE: f32 = 1e-4;
+const NECK_COMPLIANCE: f32 = 3e-4;
 /// Shirts slip under a belt when they are pulled.
 const TUCKED_COMPLIANCE: f32 = 1e-3;
-const NECK_COMPLIANCE: f32 = 3e-4;
 /// How far the seam of the neck and shoulders reaches from the neck's joint.
 const NECK_SEAM_M: f32 = 0.09;
 
@@ -72,7 +72,7 @@ pub(super) fn held(form: &Form, pattern: &Pattern, sheet: &Sheet) -> Vec<Held> {
                 weights.weights[slot] = shares[bone as usize] / kept;
             }
         }
-        let at_rest = form.bones.blend(&weights).inverse().transform_point3(point);
+        let at_rest = form.at_rest(point, &weights);
         Some(Held { point: v as u32, at_rest, weights, compliance })
     };
     sheet.points.iter().enumerate().filter_map(held).collect()

@@ -4,7 +4,7 @@
 //! forward, the seat when one sits down. Tailors leave ease there, knitters use yarn that gives; here single edges
 //! become longer.
 
-use effigy_registration::motion::{MotionPose, Routine};
+use effigy_registration::{motion::Routine, smpl::BoneTransforms};
 use glam::Vec3;
 
 use super::{form::Form, sew::Garment, sheet::Edge, wear::bones_of};
@@ -25,12 +25,12 @@ const EXTRA: [f32; 2] = [0.11, 0.0];
 /// Nothing is let out further.
 const MOST: f32 = 1.4;
 
-/// The poses clothes are tried on in.
-pub(super) fn trial_poses(person: &Person) -> Vec<MotionPose> {
+/// The poses clothes are tried on in, as bones.
+pub(super) fn trials(person: &Person) -> Vec<BoneTransforms> {
     let rest = person.rest_body();
     let trial = |routine: Routine| {
-        let motion = routine.motion(&rest, LOOKS_HZ, 0);
-        motion.poses.into_iter().take(LOOKS)
+        let poses = routine.motion(&rest, LOOKS_HZ, 0).poses.into_iter();
+        poses.take(LOOKS).map(|pose| bones_of(person, &pose.theta))
     };
     TRIALS.into_iter().flat_map(trial).collect()
 }
@@ -39,25 +39,27 @@ pub(super) fn trial_poses(person: &Person) -> Vec<MotionPose> {
 pub(super) fn let_out(
     garment: &Garment,
     form: &Form,
-    person: &Person,
-    poses: &[MotionPose],
+    trials: &[BoneTransforms],
     fit: f32,
 ) -> Vec<f32> {
+    let edges = garment.rest.edges();
+    // Between a neck and a belt that hold it, what is too wide never comes to rest.
+    if garment.pattern.is_tucked_in() {
+        return vec![1.0; edges.len()];
+    }
     let (points, weights) = (&garment.rest.points, &garment.weights);
     let at_rest: Vec<Vec3> = points
         .iter()
         .zip(weights)
-        .map(|(point, weights)| form.bones.blend(weights).inverse().transform_point3(*point))
+        .map(|(point, weights)| form.at_rest(*point, weights))
         .collect();
     let across = |points: &[Vec3], edge: &Edge| {
         let [a, b] = edge.ends.map(|v| points[v as usize]);
         a - b
     };
-    let edges = garment.rest.edges();
     let cut: Vec<Vec3> = edges.iter().map(|edge| across(points, edge)).collect();
     let mut longest_m: Vec<f32> = cut.iter().map(|cut| cut.length()).collect();
-    for pose in poses {
-        let bones = bones_of(person, &pose.theta);
+    for bones in trials {
         let moved: Vec<Vec3> = at_rest
             .iter()
             .zip(weights)
@@ -66,10 +68,6 @@ pub(super) fn let_out(
         for (longest_m, edge) in longest_m.iter_mut().zip(&edges) {
             *longest_m = longest_m.max(across(&moved, edge).length());
         }
-    }
-    // Between a neck and a belt that hold it, what is too wide never comes to rest.
-    if garment.pattern.is_tucked_in() {
-        return vec![1.0; cut.len()];
     }
     let extra = 1.0 + EXTRA[0] + (EXTRA[1] - EXTRA[0]) * fit;
     let factor = |(longest_m, cut): (f32, Vec3)| {

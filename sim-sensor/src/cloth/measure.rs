@@ -37,8 +37,8 @@ impl Wear {
 }
 
 /// Points deeper inside the body than this, and edges longer or shorter by more than this share, are counted.
-pub const DEEP_M: f32 = 0.002;
-pub const STRAINED: f32 = 0.15;
+const DEEP_M: f32 = 0.002;
+const STRAINED: f32 = 0.15;
 
 /// How well clothes behaved over a number of frames.
 #[derive(Clone, Copy, Debug, Default)]
@@ -58,11 +58,11 @@ impl Behaviour {
         }
     }
 
-    /// Counts a frame's points inside the body.
-    pub fn add_clearances(&mut self, wear: &Wear) {
-        for clearance_m in wear.clearances_m() {
+    /// Counts a frame's points inside the body, from [`Wear::clearances_m`].
+    pub fn add_clearances(&mut self, clearances_m: &[f32]) {
+        for clearance_m in clearances_m {
             self.points += 1;
-            self.deep += u64::from(clearance_m < -DEEP_M);
+            self.deep += u64::from(*clearance_m < -DEEP_M);
         }
     }
 

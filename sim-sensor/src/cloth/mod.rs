@@ -30,7 +30,7 @@ mod physics_tests;
 mod tests;
 
 pub use envelope::ClothedSurface;
-pub use measure::{Behaviour, DEEP_M, STRAINED, rms_between_m, strays_m};
+pub use measure::{Behaviour, rms_between_m, strays_m};
 pub use pattern::{ClothKind, Ease, Fabric, Front, Limbs, Pattern, Top};
 pub use sew::Garment;
 pub use sheet::Sheet;

@@ -33,6 +33,7 @@ fn napkin(fabric: Fabric, turn: Quat, lift_m: f32) -> Cloth {
     let rest = square(7, 0.02, turn, lift_m);
     let pattern = Pattern { fabric, ..ClothKind::Dress.patterns(0.5, 1)[0] };
     let laid_out = rest.points.clone();
+    let (points, edges) = (rest.points.len(), rest.edges().len());
     Cloth::new(
         &Garment {
             pattern,
@@ -41,10 +42,10 @@ fn napkin(fabric: Fabric, turn: Quat, lift_m: f32) -> Cloth {
             weights: Vec::new(),
             home: Vec::new(),
             held: Vec::new(),
-            arms: vec![None; 49],
+            arms: vec![None; points],
             rings: Vec::new(),
         },
-        &[1.0; 1000],
+        &vec![1.0; edges],
     )
 }
 

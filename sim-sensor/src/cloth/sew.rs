@@ -86,7 +86,7 @@ pub(super) fn sew(form: &Form, pattern: &Pattern, inner: &[Garment], put_on: &Fo
         .collect();
     let mut laid_out = sheet.clone();
     for (point, weights) in laid_out.points.iter_mut().zip(&weights) {
-        let at_rest = form.bones.blend(weights).inverse().transform_point3(*point);
+        let at_rest = form.at_rest(*point, weights);
         *point = put_on.bones.blend(weights).transform_point3(at_rest);
     }
     Under::new(put_on, inner).push_out(&mut laid_out);

@@ -358,9 +358,8 @@ impl Stretch {
         points[a] += push;
         points[b] -= push;
     }
-}
 
-impl Stretch {
+    /// Brings the edge back to its limit if it is beyond.
     #[inline]
     fn limit(&self, points: &mut [Vec3]) {
         let [a, b] = self.ends.map(|v| v as usize);

@@ -75,15 +75,15 @@ fn cloth_stays_outside_the_body_and_keeps_its_size_while_arms_are_raised() {
     let mut wear = wear(ClothKind::LongsleeveWideTrousers, 0.8, 2);
     let poses = opening(&wear, Routine::RaiseArms, 45);
     wear.start(&poses[0]);
-    let (mut deep, mut strained) = (Vec::new(), Vec::new());
+    let mut behaviour = Behaviour::default();
     for (number, pose) in poses.iter().enumerate() {
         wear.step(pose, FRAME_SECS);
-        strained.extend(wear.strains().map(|strain| strain.abs() > 0.15));
+        behaviour.add_strains(&wear);
         if number % 5 == 0 {
-            deep.extend(wear.clearances_m().into_iter().map(|m| m < -0.002));
+            behaviour.add_clearances(&wear.clearances_m());
         }
     }
-    let (deep, strained) = (share(deep), share(strained));
+    let (deep, strained) = (behaviour.deep_share(), behaviour.strained_share());
     assert!(deep < 1e-3, "{deep} of all points are deeper than 2 mm");
     assert!(
         strained < 0.01,
@@ -102,7 +102,7 @@ fn tight_clothes_have_room_for_a_squat() {
         wear.step(pose, FRAME_SECS);
         behaviour.add_strains(&wear);
         if number % 10 == 0 {
-            behaviour.add_clearances(&wear);
+            behaviour.add_clearances(&wear.clearances_m());
         }
     }
     let (strained, deep) = (behaviour.strained_share(), behaviour.deep_share());
@@ -136,16 +136,17 @@ fn a_jacket_stays_outside_keeps_its_size_and_its_tails_swing() {
     let mut wear = wear(ClothKind::BlazerTrousers, 0.8, 1);
     let poses = opening(&wear, Routine::Twist, 54);
     wear.start(&poses[0]);
-    let (mut deep, mut strained, mut tangled) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut behaviour, mut tangled) = (Behaviour::default(), Vec::new());
     for (number, pose) in poses.iter().enumerate() {
         wear.step(pose, FRAME_SECS);
-        strained.extend(wear.strains().map(|strain| strain.abs() > 0.15));
+        behaviour.add_strains(&wear);
         if number % 6 == 0 {
-            deep.extend(wear.clearances_m().into_iter().map(|m| m < -0.002));
+            behaviour.add_clearances(&wear.clearances_m());
             tangled.extend(inside_the_shirt_m(&wear).into_iter().map(|m| m > 0.003));
         }
     }
-    let [deep, strained, tangled] = [deep, strained, tangled].map(share);
+    let (deep, strained) = (behaviour.deep_share(), behaviour.strained_share());
+    let tangled = share(tangled);
     println!("jacket: {deep} deep, {strained} strained, {tangled} of it inside the shirt");
     assert!(deep < 1e-3, "{deep} of all points are deeper than 2 mm");
     assert!(

@@ -11,7 +11,7 @@ use glam::{Quat, Vec3};
 use super::{
     collider::{Arm, Collider, Obstacle, Part},
     form::{Form, cut_pose},
-    let_out::{let_out, trial_poses},
+    let_out::{let_out, trials},
     pattern::ClothKind,
     sew::{Garment, sew},
     sheet::Sheet,
@@ -110,25 +110,17 @@ impl Wear {
         let cut = cut_pose(kind.legs_apart_rad(), 0.0);
         let form = Form::new(&person, &cut);
         let seat = Form::new(&person, &cut_pose(kind.legs_apart_rad(), SEAT_RAD));
-        let mut garments: Vec<Garment> = Vec::new();
+        let trials = trials(&person);
+        let (mut garments, mut cloths) = (Vec::<Garment>::new(), Vec::<Cloth>::new());
         for pattern in kind.patterns(fit, seed) {
-            let garment = if pattern.has_legs() {
-                sew(&seat, &pattern, &garments, &form)
-            } else {
-                sew(&form, &pattern, &garments, &form)
-            };
+            let cut_on = if pattern.has_legs() { &seat } else { &form };
+            let garment = sew(cut_on, &pattern, &garments, &form);
+            cloths.push(Cloth::new(
+                &garment,
+                &let_out(&garment, cut_on, &trials, fit),
+            ));
             garments.push(garment);
         }
-        let poses = trial_poses(&person);
-        let cloth = |garment: &Garment| {
-            let cut_on = if garment.pattern.has_legs() {
-                &seat
-            } else {
-                &form
-            };
-            Cloth::new(garment, &let_out(garment, cut_on, &person, &poses, fit))
-        };
-        let mut cloths: Vec<Cloth> = garments.iter().map(cloth).collect();
         let random = Randomness::new(seed, 0, 0xc10f);
         for (cloth, garment) in cloths.iter_mut().zip(&garments) {
             cloth.points.clone_from(&garment.laid_out);

@@ -78,12 +78,12 @@ impl Sequence {
                 visits.push((frame, truth_now.clothed_in_world.clone()));
             }
             gathered.add(truth_now);
-            if let Some(wear) = truth.scene().wear_after(FrameId(frame)) {
-                behaviour.add_strains(&wear);
+            truth.scene().worn_at(FrameId(frame), |wear| {
+                behaviour.add_strains(wear);
                 if frame.is_multiple_of(4) {
-                    behaviour.add_clearances(&wear);
+                    behaviour.add_clearances(&wear.clearances_m());
                 }
-            }
+            });
         }
         visits.reverse();
         let last = u64::from(plan.frames.saturating_sub(1));

@@ -2,8 +2,7 @@
 
 use effigy_avatar::meta::{PriorConfig, time_one_step};
 
-use crate::pipeline::clock::Clock;
-use crate::say::say;
+use crate::{pipeline::clock::Clock, say::say};
 
 /// Prints the arithmetic and the time of `effigy train sdf`.
 pub(super) fn say_field(config: &PriorConfig) {
