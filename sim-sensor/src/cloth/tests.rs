@@ -12,7 +12,12 @@ use effigy_registration::{
 use glam::Vec3;
 
 use super::*;
-use crate::{Outfit, OutfitKind, Person, Scenario, SimulatedSensor, Truth, person::sample_betas};
+use crate::{
+    Outfit, OutfitKind, Person, Scenario, SimulatedSensor, Truth,
+    person::sample_betas,
+    scenario::{Likeness, MotionChoice},
+    scene::Scene,
+};
 
 const FRAME_SECS: f32 = 1.0 / 30.0;
 
@@ -91,7 +96,7 @@ fn cloth_stays_outside_the_body_and_keeps_its_size_while_arms_are_raised() {
     );
 }
 
-/// Without the room that is let out, 4 % of the edges of this one are strained on the way down.
+/// Without the room that is let out, 3 % of the edges of this one are strained on the way down.
 #[test]
 fn tight_clothes_have_room_for_a_squat() {
     let mut wear = wear(ClothKind::TshirtTrousers, 0.2, 3);
@@ -111,23 +116,36 @@ fn tight_clothes_have_room_for_a_squat() {
     assert!(deep < 1e-3, "{deep} of all points are deeper than 2 mm");
 }
 
+/// A heavy person's forearms go into the trunk here. Without rings a sleeve strays 16 mm beyond its room, with them
+/// less than 1 mm: contacts have the last word.
 #[test]
-fn sleeves_stay_on_while_fists_fly() {
-    let mut wear = wear(ClothKind::HoodieTrousers, 0.5, 2);
-    let poses = opening(&wear, Routine::Punch, 36);
-    wear.start(&poses[0]);
-    for pose in &poses {
-        wear.step(pose, FRAME_SECS);
-        let axes = wear.arm_axes(pose);
-        let hoodie = wear.garments().last().unwrap();
-        let points = wear.points().last().unwrap();
-        assert!(hoodie.rings.len() > 16, "two long sleeves");
-        for ring in &hoodie.rings {
-            // Contacts have the last word.
-            let excess_m = ring.excess_m(points, &axes);
-            assert!(excess_m < 0.03, "a sleeve is {excess_m} m off its arm");
-        }
+fn sleeves_stay_on_arms_that_are_pressed_into_the_trunk() {
+    let scenario = Scenario {
+        seed: 1_000_008,
+        likeness: Likeness::Individual,
+        motion: MotionChoice::Routine(Routine::ChickenWings),
+        outfit: OutfitKind::LongsleeveWideTrousers,
+        seconds: 2.5,
+        rate_hz: Some(12.0),
+        ..Scenario::default()
+    };
+    let scene = Scene::new(&scenario, builtin::body()).unwrap();
+    let mut furthest_m = f32::MIN;
+    for frame in 0..30 {
+        let pose = scene.pose(FrameId(frame));
+        let looked = scene.worn_at(FrameId(frame), |wear| {
+            let axes = wear.arm_axes(&pose);
+            let shirt = wear.garments().last().unwrap();
+            let points = wear.points().last().unwrap();
+            assert!(shirt.rings.len() > 16, "two long sleeves");
+            for ring in &shirt.rings {
+                furthest_m = furthest_m.max(ring.excess_m(points, &axes));
+            }
+        });
+        assert!(looked.is_some(), "clothes are simulated");
     }
+    println!("sleeves: at most {furthest_m} m beyond their room");
+    assert!(furthest_m < 0.008, "a sleeve is {furthest_m} m off its arm");
 }
 
 /// The outfit with the most layers, in a movement that a jacket does not like.
