@@ -304,6 +304,9 @@ pub(crate) struct DatasetViewArgs {
     /// Sequences shown of each outfit
     #[arg(long, default_value_t = 1)]
     pub(crate) rows: usize,
+    /// Show only sequences with this in their name, for instance `skirt` or `test-002`
+    #[arg(long, default_value = "", hide_default_value = true)]
+    pub(crate) only: String,
 }
 
 /// A name as the data set's files spell it.

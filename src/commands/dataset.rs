@@ -1,6 +1,6 @@
 //! `effigy dataset`: simulated people to learn from and to measure with, made and looked at.
 
-use std::{collections::BTreeMap, path::Path, sync::Arc};
+use std::{collections::BTreeMap, f32::consts::PI, path::Path, sync::Arc};
 
 use anyhow::bail;
 use effigy_fusion::TriangleMesh;
@@ -9,7 +9,10 @@ use effigy_sim_sensor::dataset::{
     CapeImport, ClothFacts, Dataset, DatasetPlan, DatasetPreset, Gender, MakeProgress, Manifest,
     Sequence, SequenceEntry, Split, import_cape, make,
 };
-use effigy_viewer::pictures::{Clay, ContactSheet, MeshView, Picture, PictureCamera, render_mesh};
+use effigy_viewer::pictures::{
+    Clay, ContactSheet, MeshView, Picture, PictureCamera, palette, render_mesh,
+};
+use image::imageops;
 
 use crate::{
     cli::{CapeGender, DatasetArgs, DatasetMakeArgs, DatasetViewArgs, DatasetWhat, ImportCapeArgs},
@@ -21,6 +24,10 @@ use crate::{
 /// Moments of a sequence that a sheet shows.
 const MOMENTS: usize = 4;
 const TILE_PX: [u32; 2] = [260, 360];
+/// A little from the side and from above.
+const FROM_FRONT_RAD: f32 = 0.4;
+const FROM_BEHIND_RAD: f32 = FROM_FRONT_RAD + PI;
+const ELEVATION_RAD: f32 = 0.1;
 
 pub(crate) fn run(args: &DatasetArgs) -> anyhow::Result<()> {
     match &args.what {
@@ -158,20 +165,27 @@ fn view(args: &DatasetViewArgs) -> anyhow::Result<()> {
         cloth_table(manifest)
     );
     let mut shown: BTreeMap<&str, usize> = BTreeMap::new();
-    let mut sheet = ContactSheet::new(MOMENTS + 1);
+    let mut sheet = ContactSheet::new(MOMENTS + 2);
     for entry in &dataset.manifest().sequences {
         let rows = shown.entry(entry.plan.outfit.name()).or_default();
-        if *rows < args.rows {
+        if entry.plan.name.contains(&args.only) && *rows < args.rows {
             *rows += 1;
             sheet = add_row(sheet, entry, &dataset.load(entry)?);
         }
+    }
+    if sheet.is_empty() {
+        bail!(
+            "no sequence of {} has `{}` in its name; the files there are called after their sequences",
+            args.dataset.display(),
+            args.only
+        );
     }
     sheet.save(&args.out)?;
     say!("{}", args.out.display());
     Ok(())
 }
 
-/// Moments from the front, and the last one's star pose.
+/// Moments from the front, the last one also from behind, and its star pose.
 fn add_row(mut sheet: ContactSheet, entry: &SequenceEntry, sequence: &Sequence) -> ContactSheet {
     let last = sequence.frames.len().saturating_sub(1);
     let plan = &entry.plan;
@@ -187,13 +201,31 @@ fn add_row(mut sheet: ContactSheet, entry: &SequenceEntry, sequence: &Sequence) 
         } else {
             format!("{} {frame}", plan.action)
         };
-        sheet = sheet.add(label, drawn(&sequence.posed_mesh(frame), TILE_PX));
+        sheet = sheet.add(label, in_color(sequence, frame, FROM_FRONT_RAD));
     }
+    sheet = sheet.add("from behind", in_color(sequence, last, FROM_BEHIND_RAD));
     sheet.add("star pose", drawn(&sequence.star_mesh(last), TILE_PX))
 }
 
-/// In clay, a little from the side and from above.
+/// As a colour camera sees somebody who stands some way around them.
+fn in_color(sequence: &Sequence, frame: usize, azimuth_rad: f32) -> Picture {
+    let mesh = sequence.posed_mesh(frame);
+    let fine_px = TILE_PX.map(|side| side * 2);
+    let camera = PictureCamera::around(&mesh.vertices, azimuth_rad, ELEVATION_RAD, fine_px);
+    let view = sequence.in_color(frame, camera.intrinsics, camera.camera_from_world.inverse());
+    let mut picture = Picture::new(fine_px[0], fine_px[1]);
+    for ((pixel, color), depth_m) in picture.pixels_mut().zip(view.shaded()).zip(&view.depth_m) {
+        *pixel = image::Rgb(if *depth_m > 0.0 {
+            color
+        } else {
+            palette::PANEL
+        });
+    }
+    imageops::thumbnail(&picture, TILE_PX[0], TILE_PX[1])
+}
+
+/// In clay.
 pub(super) fn drawn(mesh: &TriangleMesh, size_px: [u32; 2]) -> Picture {
-    let camera = PictureCamera::around(&mesh.vertices, 0.4, 0.1, size_px);
+    let camera = PictureCamera::around(&mesh.vertices, FROM_FRONT_RAD, ELEVATION_RAD, size_px);
     render_mesh(MeshView::from(mesh), &camera, Clay::default())
 }

@@ -11,11 +11,12 @@ use super::{form::Form, sew::Garment, sheet::Edge, wear::bones_of};
 use crate::person::Person;
 
 /// What is done while trying on, how often the tailor looks, and how many times.
-const TRIALS: [Routine; 4] = [
+const TRIALS: [Routine; 5] = [
     Routine::Squat,
     Routine::Reach,
     Routine::Bend,
     Routine::RaiseArms,
+    Routine::Punch,
 ];
 const LOOKS_HZ: f32 = 4.0;
 const LOOKS: usize = 16;

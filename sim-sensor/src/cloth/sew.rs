@@ -78,7 +78,7 @@ pub(super) fn sew(form: &Form, pattern: &Pattern, inner: &[Garment], put_on: &Fo
         .iter()
         .map(|weights| Arm::of_bone(weights.main_bone()))
         .collect();
-    let rings = rings(form, pattern, &sheet, &arms);
+    let rings = rings(form, &sheet, &arms);
     let home = sheet
         .points
         .iter()

@@ -1,13 +1,13 @@
-//! Sleeves stay on: a ring of cloth around an arm may slide and sag, but not leave it.
+//! Sleeves stay on: a ring of cloth around an arm may slide and sag a little, but not leave it, nor be rolled up.
 //!
 //! Where a bent forearm is pressed into the upper arm or the trunk, bodies made of skinning weights run into
 //! themselves, and cloth between the two surfaces has no place to be. Contacts alone then push it out on either side.
 
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, ops::RangeInclusive};
 
 use glam::Vec3;
 
-use super::{collider::Arm, form::Form, pattern::Pattern, sheet::Sheet};
+use super::{collider::Arm, form::Form, sheet::Sheet};
 
 /// Rings are this far apart, as a share of the upper arm's or forearm's length, and begin below the armpit.
 const SPACING: f32 = 0.1;
@@ -15,26 +15,27 @@ const FIRST_STATION: f32 = 0.35;
 /// A ring of fewer points is none.
 const LEAST_POINTS: usize = 6;
 /// How far a ring's middle may be from the arm's, beyond its ease.
-const SAG_M: f32 = 0.02;
+const SAG_M: f32 = 0.012;
+/// How far a ring may slide along its arm from where it was cut, either way, before that counts as leaving it.
+const SLIDE_M: f32 = 0.03;
 
 /// Shoulder, elbow, wrist and hand of both arms.
 pub(super) type ArmAxes = [[Vec3; 4]; 2];
+pub(super) const ARM_JOINTS: [[usize; 4]; 2] = [[16, 18, 20, 22], [17, 19, 21, 23]];
 
 /// Points of a sleeve at one station of an arm.
 #[derive(Clone, Debug)]
 pub(super) struct Ring {
     arm: Arm,
     points: Vec<u32>,
+    /// Where it was cut, along shoulder, elbow, wrist and hand.
+    home_m: f32,
     most_m: f32,
 }
 
 /// The rings of a garment's sleeves, each in the order of its points' numbers.
-pub(super) fn rings(
-    form: &Form,
-    pattern: &Pattern,
-    sheet: &Sheet,
-    arms: &[Option<Arm>],
-) -> Vec<Ring> {
+pub(super) fn rings(form: &Form, sheet: &Sheet, arms: &[Option<Arm>]) -> Vec<Ring> {
+    let axes = ARM_JOINTS.map(|arm| arm.map(|joint| form.joints[joint]));
     let mut rings: BTreeMap<(usize, u32), Vec<u32>> = BTreeMap::new();
     for (v, (&point, arm)) in sheet.points.iter().zip(arms).enumerate() {
         let Some(arm) = arm else { continue };
@@ -44,11 +45,19 @@ pub(super) fn rings(
             rings.entry(ring).or_default().push(v as u32);
         }
     }
-    let most_m = SAG_M + pattern.ease.limb_m.max(pattern.ease.end_m);
     rings
         .into_iter()
         .filter(|(_, points)| points.len() >= LEAST_POINTS)
-        .map(|((arm, _), points)| Ring { arm: Arm::BOTH[arm], points, most_m })
+        .map(|((side, _), points)| {
+            let middle = middle_of(&points, &sheet.points);
+            let home_m = nearest_on(&axes[side], middle, 0.0..=f32::MAX).0;
+            let eases_m = points.iter().map(|&v| {
+                let point = sheet.points[v as usize];
+                form.tree.query(point).point.distance(point)
+            });
+            let ease_m = eases_m.sum::<f32>() / points.len() as f32;
+            Ring { arm: Arm::BOTH[side], points, home_m, most_m: SAG_M + ease_m }
+        })
         .collect()
 }
 
@@ -71,31 +80,45 @@ impl Ring {
         self.aside(points, axes).length() - self.most_m
     }
 
-    /// From the arm's middle to the ring's.
+    /// From where on its arm the ring's middle may be to where it is.
     fn aside(&self, points: &[Vec3], axes: &ArmAxes) -> Vec3 {
-        let sum: Vec3 = self.points.iter().map(|&v| points[v as usize]).sum();
-        let middle = sum / self.points.len() as f32;
-        let axis = &axes[self.arm as usize];
-        let nearest = axis
-            .windows(2)
-            .map(|bone| on_segment(middle, bone[0], bone[1]))
-            .min_by(|a, b| {
-                a.distance_squared(middle)
-                    .total_cmp(&b.distance_squared(middle))
-            })
-            .unwrap_or(middle);
-        middle - nearest
+        let middle = middle_of(&self.points, points);
+        let reach_m = self.home_m - SLIDE_M..=self.home_m + SLIDE_M;
+        middle - nearest_on(&axes[self.arm as usize], middle, reach_m).1
     }
 }
 
-fn on_segment(point: Vec3, from: Vec3, to: Vec3) -> Vec3 {
-    let along = to - from;
-    let share = (point - from).dot(along) / along.length_squared().max(1e-12);
-    from + along * share.clamp(0.0, 1.0)
+fn middle_of(ring: &[u32], points: &[Vec3]) -> Vec3 {
+    ring.iter().map(|&v| points[v as usize]).sum::<Vec3>() / ring.len() as f32
+}
+
+/// The point nearest to another on a part of an arm's axis, and how far along the axis that is.
+fn nearest_on(axis: &[Vec3; 4], point: Vec3, part_m: RangeInclusive<f32>) -> (f32, Vec3) {
+    let mut nearest = (0.0, axis[0]);
+    let mut nearest_m = f32::MAX;
+    let mut passed_m = 0.0;
+    for bone in axis.windows(2) {
+        let length_m = bone[0].distance(bone[1]).max(1e-6);
+        let along = (bone[1] - bone[0]) / length_m;
+        let first_m = (part_m.start() - passed_m).max(0.0);
+        let last_m = (part_m.end() - passed_m).min(length_m);
+        if first_m <= last_m {
+            let at_m = (point - bone[0]).dot(along).clamp(first_m, last_m);
+            let on_bone = bone[0] + along * at_m;
+            if on_bone.distance(point) < nearest_m {
+                nearest_m = on_bone.distance(point);
+                nearest = (passed_m + at_m, on_bone);
+            }
+        }
+        passed_m += length_m;
+    }
+    nearest
 }
 
 #[cfg(test)]
 mod tests {
+    use glam::vec3;
+
     use super::*;
 
     #[test]
@@ -104,7 +127,7 @@ mod tests {
             [Vec3::ZERO, Vec3::X, Vec3::X * 2.0, Vec3::X * 2.2],
             [Vec3::Y; 4],
         ];
-        let ring = Ring { arm: Arm::Left, points: vec![0, 1, 2, 3], most_m: 0.03 };
+        let ring = Ring { arm: Arm::Left, points: vec![0, 1, 2, 3], home_m: 1.5, most_m: 0.03 };
         let around = [Vec3::Y, Vec3::Z, -Vec3::Y, -Vec3::Z].map(|out| Vec3::X * 1.5 + out * 0.06);
         let mut points = around;
         ring.hold(&mut points, &axes);
@@ -118,5 +141,32 @@ mod tests {
             let moved = *point - before;
             assert!((moved - Vec3::Y * 0.03).length() < 1e-6, "{moved}");
         }
+    }
+
+    #[test]
+    fn a_ring_slides_no_further_than_a_sleeve_does() {
+        let axes = [
+            [
+                Vec3::ZERO,
+                Vec3::X,
+                vec3(1.0, 1.0, 0.0),
+                vec3(1.0, 1.2, 0.0),
+            ],
+            [Vec3::Y; 4],
+        ];
+        let ring = Ring { arm: Arm::Left, points: vec![0, 1], home_m: 1.5, most_m: 0.03 };
+        let mut points = [Vec3::Z, -Vec3::Z].map(|out| vec3(1.0, 0.2, 0.0) + out * 0.06);
+        ring.hold(&mut points, &axes);
+        let middle = 0.5 * (points[0] + points[1]);
+        let expected = vec3(1.0, 0.5 - SLIDE_M - 0.03, 0.0);
+        assert!(middle.distance(expected) < 1e-6, "{middle}");
+        // A bent arm: the ring belongs to the forearm, though the upper arm is nearer.
+        let mut points = [Vec3::Z, -Vec3::Z].map(|out| vec3(0.5, 0.1, 0.0) + out * 0.06);
+        ring.hold(&mut points, &axes);
+        let middle = 0.5 * (points[0] + points[1]);
+        assert!(
+            middle.distance(vec3(1.0, 0.5 - SLIDE_M, 0.0)) < 0.031,
+            "{middle}"
+        );
     }
 }

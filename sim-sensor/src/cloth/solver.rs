@@ -297,14 +297,15 @@ impl Cloth {
     }
 
     /// Brings edges that are still far too long or too short to the limit (Provot, *Deformation constraints in a
-    /// mass-spring model*, 1995): the rounds above share a pull out over few edges only.
+    /// mass-spring model*, 1995): the rounds above share a pull out over few edges only. Lengths have the last word:
+    /// in a bent elbow, where surfaces run into each other, contacts pull a sleeve's neighbours apart.
     fn limit_strain(&mut self) {
         for _ in 0..STRAIN_ROUNDS {
-            for stretch in &self.stretches {
-                stretch.limit(&mut self.points);
-            }
             for contact in &mut self.contacts {
                 contact.push(&mut self.points);
+            }
+            for stretch in &self.stretches {
+                stretch.limit(&mut self.points);
             }
         }
     }

@@ -15,7 +15,7 @@ use super::{
     pattern::ClothKind,
     sew::{Garment, sew},
     sheet::Sheet,
-    sleeve::ArmAxes,
+    sleeve::{ARM_JOINTS, ArmAxes},
     solver::Cloth,
 };
 use crate::{
@@ -318,8 +318,7 @@ impl Wear {
     /// Where a pose has shoulders, elbows, wrists and hands.
     pub(super) fn arm_axes(&self, pose: &MotionPose) -> ArmAxes {
         let (_, joints) = BoneTransforms::from_pose(&pose.theta, &self.person.rest_joints);
-        [[16, 18, 20, 22], [17, 19, 21, 23]]
-            .map(|arm| arm.map(|joint: usize| joints[joint] + pose.trans))
+        ARM_JOINTS.map(|arm| arm.map(|joint| joints[joint] + pose.trans))
     }
 
     /// Where a pose carries what is held, for each garment.

@@ -91,8 +91,11 @@ impl Dataset {
                 "{problem}; a data set is complete when it has this file: make it with `effigy dataset make`"
             ))
         })?;
-        let manifest: Manifest =
-            serde_json::from_slice(&text).map_err(|error| wrong(error.to_string()))?;
+        let manifest: Manifest = serde_json::from_slice(&text).map_err(|error| {
+            wrong(format!(
+                "{error}; if an earlier version of Effigy made this folder, run `effigy dataset make` into a new one"
+            ))
+        })?;
         if ![DATASET_SCHEMA, EARLIER_SCHEMA].contains(&manifest.schema.as_str()) {
             let found = &manifest.schema;
             return Err(wrong(format!(

@@ -11,7 +11,7 @@ use crate::{
     noise::Exposure,
     person::Paint,
     preset::SensorPreset,
-    render::Renderer,
+    render::{Renderer, View},
     scenario::{Noise, Room},
 };
 
@@ -67,6 +67,13 @@ impl Sequence {
         )
     }
 
+    /// The person of a frame as a colour camera sees them, with nothing around them.
+    pub fn in_color(&self, frame: usize, camera: Intrinsics, world_from_camera: Rigid3) -> View {
+        let mut renderer = self.renderer(camera, world_from_camera, Room::Empty);
+        let mesh = self.posed_mesh(frame);
+        renderer.render(&mesh, &self.paint(), &self.weights).clone()
+    }
+
     /// What a real sensor would deliver of a frame, with its noise, and the calibration that belongs to it
     /// (`world_from_camera` included). The sensor stands as in a simulation, around the pelvis; floor and wall
     /// turn with it, so the wall is always behind the person.
@@ -83,10 +90,7 @@ impl Sequence {
             *normal = studio_from_world.rotation * *normal;
         }
         let intrinsics = shot.sensor.intrinsics();
-        let mut renderer = Renderer::new(intrinsics, mount, shot.room);
-        if self.layers.iter().any(|&layer| layer > 0) {
-            renderer = renderer.two_sided();
-        }
+        let mut renderer = self.renderer(intrinsics, mount, shot.room);
         let view = renderer.render(&mesh, &self.paint(), &self.weights);
         let mut exposure = Exposure::new(&calibration, shot.sensor.defects());
         let id = self.frames[frame].id;
@@ -104,6 +108,14 @@ impl Sequence {
         };
         calibration.world_from_camera = Some(world_from_studio * mount);
         (exposed, calibration)
+    }
+
+    fn renderer(&self, camera: Intrinsics, world_from_camera: Rigid3, room: Room) -> Renderer {
+        let renderer = Renderer::new(camera, world_from_camera, room);
+        if self.layers.iter().any(|&layer| layer > 0) {
+            return renderer.two_sided();
+        }
+        renderer
     }
 
     /// From a room in which the person stands above the origin and the sensor where its mount says.
