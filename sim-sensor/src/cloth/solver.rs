@@ -231,7 +231,7 @@ impl Cloth {
 
     /// Where every point is outside of everything, without a push that would move it on.
     pub(super) fn push_out(&mut self, obstacles: &[Obstacle<'_>]) {
-        for _ in 0..2 {
+        for _ in 0..4 {
             self.find_contacts(obstacles);
             for contact in &mut self.contacts {
                 contact.push(&mut self.points);
@@ -297,16 +297,27 @@ impl Cloth {
     }
 
     /// Brings edges that are still far too long or too short to the limit (Provot, *Deformation constraints in a
-    /// mass-spring model*, 1995): the rounds above share a pull out over few edges only. Lengths have the last word:
-    /// in a bent elbow, where surfaces run into each other, contacts pull a sleeve's neighbours apart.
+    /// mass-spring model*, 1995): the rounds above share a pull out over few edges only. Contacts have the last word,
+    /// but in shirts with sleeves lengths have it: around a bent elbow, where surfaces run into each other, contacts
+    /// pull a sleeve's neighbours apart.
     fn limit_strain(&mut self) {
+        let contacts_last = self.rings.is_empty();
         for _ in 0..STRAIN_ROUNDS {
+            if contacts_last {
+                self.limit_lengths();
+            }
             for contact in &mut self.contacts {
                 contact.push(&mut self.points);
             }
-            for stretch in &self.stretches {
-                stretch.limit(&mut self.points);
+            if !contacts_last {
+                self.limit_lengths();
             }
+        }
+    }
+
+    fn limit_lengths(&mut self) {
+        for stretch in &self.stretches {
+            stretch.limit(&mut self.points);
         }
     }
 
