@@ -7,7 +7,10 @@ use effigy_registration::motion::Routine;
 use effigy_sim_sensor::{MotionChoice, OutfitKind, SensorPreset, dataset::DatasetPreset};
 use serde::de::{DeserializeOwned, IntoDeserializer as _, value};
 
-use crate::{commands::evaluate::Table, pipeline::settings::MOST_KEYFRAMES};
+use crate::{
+    commands::evaluate::{Method, Table},
+    pipeline::settings::MOST_KEYFRAMES,
+};
 
 /// One depth camera in, a live avatar out.
 #[derive(Debug, Parser)]
@@ -445,6 +448,9 @@ pub(crate) struct EvaluateAvatarArgs {
     /// Only these parts: few-shot, data, sensors, fitted, ablation, strangers
     #[arg(long, value_name = "TABLE", value_delimiter = ',', value_parser = kebab::<Table>)]
     tables: Vec<Table>,
+    /// Only these methods, named as the tables name them
+    #[arg(long, value_name = "METHOD", value_delimiter = ',', value_parser = kebab::<Method>)]
+    pub(crate) methods: Vec<Method>,
     /// Every test person in every outfit, not only the four of the tables
     #[arg(long)]
     pub(crate) all: bool,
@@ -495,9 +501,12 @@ pub(crate) struct EvaluateSkinningArgs {
     /// The data set (`effigy dataset make --preset cape-like`)
     #[arg(long, value_name = "DIR")]
     pub(crate) data: PathBuf,
-    /// The networks to measure (`effigy train skinning`)
+    /// The networks to measure (`effigy train skinning`) instead of the shipped ones
     #[arg(long, value_name = "FILE")]
-    pub(crate) networks: PathBuf,
+    pub(crate) networks: Option<PathBuf>,
+    /// Only outfits with this in their name
+    #[arg(long, default_value = "", hide_default_value = true)]
+    pub(crate) outfit: String,
     /// Write all figures here
     #[arg(long, value_name = "FILE")]
     pub(crate) json: Option<PathBuf>,

@@ -35,6 +35,8 @@ pub enum SkinningChoice {
     /// No training: the closest point of the minimal body.
     #[default]
     ClosestBodyPoint,
+    /// The networks that ship with the program, for the built-in body.
+    Shipped,
     /// Networks in a file that `effigy train skinning` wrote.
     Network(PathBuf),
 }
@@ -105,13 +107,23 @@ impl CanonicaliseConfig {
         model: &Arc<BodyModel>,
         betas: &[f32; 10],
     ) -> Result<Arc<dyn Skinning>, AvatarError> {
-        let closest =
-            ClosestBodyPoint::new(Arc::clone(model), betas, self.closest_body_point.clone());
-        let SkinningChoice::Network(path) = &self.skinning else {
-            return Ok(Arc::new(closest));
+        let networks = match &self.skinning {
+            SkinningChoice::ClosestBodyPoint => {
+                let config = self.closest_body_point.clone();
+                return Ok(Arc::new(ClosestBodyPoint::new(
+                    Arc::clone(model),
+                    betas,
+                    config,
+                )));
+            }
+            SkinningChoice::Shipped => SkinningNetworks::shipped(model.identity)?,
+            SkinningChoice::Network(path) => SkinningNetworks::load(path, model.identity)?,
         };
-        let networks = SkinningNetworks::load(path, model.identity)?;
-        Ok(Arc::new(NetworkSkinning::new(Arc::new(networks), closest)))
+        Ok(Arc::new(NetworkSkinning::new(
+            Arc::new(networks),
+            Arc::clone(model),
+            betas,
+        )))
     }
 }
 

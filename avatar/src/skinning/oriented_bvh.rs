@@ -20,6 +20,8 @@ pub(super) struct OrientedHit {
     pub(super) vertices: [u32; 3],
     pub(super) barycentric: [f32; 3],
     pub(super) distance_m: f32,
+    /// The distance, and what normals that disagree add to it.
+    pub(super) cost_m: f32,
     /// From the mesh to the point.
     pub(super) offset: Vec3,
     /// The mesh's unit normal there.
@@ -92,7 +94,8 @@ impl OrientedBvh {
             }
         }
         best.map_or_else(OrientedHit::nowhere, |(triangle, barycentric)| {
-            triangle.hit(point, barycentric)
+            let cost_m = best_cost.sqrt();
+            OrientedHit { cost_m, ..triangle.hit(point, barycentric) }
         })
     }
 
@@ -165,6 +168,7 @@ impl Triangle {
             vertices: self.vertices,
             barycentric,
             distance_m: offset.length(),
+            cost_m: offset.length(),
             offset,
             normal: mix(&self.normals, barycentric).normalize_or_zero(),
         }
@@ -178,6 +182,7 @@ impl OrientedHit {
             vertices: [0; 3],
             barycentric: [1.0, 0.0, 0.0],
             distance_m: 0.0,
+            cost_m: 0.0,
             offset: Vec3::ZERO,
             normal: Vec3::ZERO,
         }

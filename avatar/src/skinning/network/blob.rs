@@ -1,6 +1,6 @@
 //! The networks as bytes: safetensors in half precision, with sizes and provenance in the metadata.
 
-use std::{collections::HashMap, fs, path::Path};
+use std::{collections::HashMap, fs, io::Read as _, path::Path, sync::OnceLock};
 
 use effigy_registration::smpl::{BodyIdentity, JOINT_COUNT};
 use half::f16;
@@ -13,7 +13,9 @@ use crate::{error::AvatarError, hyper::Provenance};
 
 /// Version of the layout; a reader refuses any other.
 pub const NETWORKS_FORMAT: &str = "effigy-skinning-1";
+static SHIPPED_BYTES: &[u8] = include_bytes!("../../../assets/skinning_live.safetensors");
 /// Bounds on what a file may ask us to allocate.
+const MOST_BYTES: u64 = 256 << 20;
 const MOST_WIDTH: usize = 1024;
 const MOST_PARAMETERS: usize = 50_000_000;
 
@@ -95,9 +97,28 @@ impl SkinningNetworks {
     /// Reads a file of networks that were trained with this body.
     pub fn load(path: &Path, body: BodyIdentity) -> Result<Self, AvatarError> {
         let io = |source| AvatarError::Io { path: path.to_owned(), source };
-        let networks = Self::from_bytes(&fs::read(path).map_err(io)?)?;
-        match networks.provenance.body {
-            Some(found) if found == body => Ok(networks),
+        let file = fs::File::open(path).map_err(io)?;
+        let mut bytes = Vec::new();
+        file.take(MOST_BYTES).read_to_end(&mut bytes).map_err(io)?;
+        Self::from_bytes(&bytes)?.of_body(body, path)
+    }
+
+    /// The networks that ship with the program; refused for another body than the built-in one.
+    ///
+    /// # Panics
+    /// If the embedded file is broken, which a test excludes.
+    pub fn shipped(body: BodyIdentity) -> Result<Self, AvatarError> {
+        static SHIPPED: OnceLock<SkinningNetworks> = OnceLock::new();
+        let networks = SHIPPED
+            .get_or_init(|| Self::from_bytes(SHIPPED_BYTES).expect("the embedded file is whole"));
+        networks
+            .clone()
+            .of_body(body, Path::new("the embedded skinning networks"))
+    }
+
+    fn of_body(self, body: BodyIdentity, path: &Path) -> Result<Self, AvatarError> {
+        match self.provenance.body {
+            Some(found) if found == body => Ok(self),
             found => Err(AvatarError::SkinningOtherBody {
                 path: path.to_owned(),
                 found: found.map_or_else(|| "none".to_owned(), |found| found.to_string()),
@@ -189,4 +210,22 @@ fn check_bounds(config: &NetworkConfig) -> Result<(), AvatarError> {
 
 fn json(what: &impl serde::Serialize) -> String {
     serde_json::to_string(what).expect("plain data serialises")
+}
+
+#[cfg(test)]
+mod tests {
+    use effigy_registration::smpl::builtin;
+
+    use super::*;
+
+    #[test]
+    fn embedded_networks_are_whole_and_of_the_built_in_body() {
+        let networks = SkinningNetworks::shipped(builtin::body().identity).unwrap();
+        assert!(networks.provenance.training.contains("train skinning"));
+        // Issue's bound for all that is embedded: 25 MB; this is the smallest part of it.
+        assert!(SHIPPED_BYTES.len() < 1_000_000);
+        let other = BodyIdentity([7; 16]);
+        let refusal = SkinningNetworks::shipped(other).unwrap_err().to_string();
+        assert!(refusal.contains("embedded"), "{refusal}");
+    }
 }

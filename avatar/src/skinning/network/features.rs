@@ -9,9 +9,8 @@ use rayon::prelude::*;
 
 use super::{mixture::Named, net::Cloud};
 use crate::skinning::{
-    BoneWeights, ClosestBodyPoint, SkinnedPoint, Warp,
-    oriented_bvh::{OrientedBvh, OrientedHit},
-    transform_normal,
+    BoneWeights, ClosestBodyPoint, SkinnedPoint, Warp, closest_body_point::BodyTrees,
+    oriented_bvh::OrientedHit, transform_normal,
 };
 
 /// Of one named body point.
@@ -38,7 +37,7 @@ pub(super) struct Described {
 /// A body in a pose that points are described by.
 pub(super) struct Surroundings<'a> {
     skinning: &'a ClosestBodyPoint,
-    tree: &'a OrientedBvh,
+    trees: &'a BodyTrees,
     /// How points lose the pose; none in star pose.
     warp: Option<Warp>,
     /// From posed space to the root's own, at the middle of the body, in units of 1.5 over its size.
@@ -51,30 +50,30 @@ pub(super) struct Surroundings<'a> {
 impl<'a> Surroundings<'a> {
     pub(super) fn posed(
         skinning: &'a ClosestBodyPoint,
-        tree: &'a OrientedBvh,
+        trees: &'a BodyTrees,
         posed: &PosedBody,
         rest_joints: &[Vec3; JOINT_COUNT],
     ) -> Self {
         let rotation = posed.bones.0[0].matrix3.transpose();
         let warp = Some(Warp::of_posed(posed, rest_joints));
-        Self { warp, ..Self::unposed(skinning, tree, rotation, &posed.vertices) }
+        Self { warp, ..Self::unposed(skinning, trees, rotation, &posed.vertices) }
     }
 
     pub(super) fn star(skinning: &'a ClosestBodyPoint) -> Self {
-        let tree = &skinning.star_body;
-        Self::unposed(skinning, tree, Mat3A::IDENTITY, &skinning.star)
+        let trees = &skinning.star_body;
+        Self::unposed(skinning, trees, Mat3A::IDENTITY, &skinning.star)
     }
 
     fn unposed(
         skinning: &'a ClosestBodyPoint,
-        tree: &'a OrientedBvh,
+        trees: &'a BodyTrees,
         rotation: Mat3A,
         body: &[Vec3],
     ) -> Self {
         let turned = body.iter().map(|&vertex| rotation * vertex);
         let (middle, scale) = normalisation(turned);
         let (star_middle, _) = normalisation(skinning.star.iter().copied());
-        Self { skinning, tree, warp: None, rotation, middle, scale, star_middle }
+        Self { skinning, trees, warp: None, rotation, middle, scale, star_middle }
     }
 
     /// `normals` are unit or zero, or there are none.
@@ -100,9 +99,10 @@ impl<'a> Surroundings<'a> {
 
     fn row(&self, point: Vec3, normal: Vec3) -> Row {
         let opposed_m = self.skinning.config.opposed_normal_m;
-        let facing = self.tree.closest(point, normal, opposed_m);
-        let nearest = self.tree.closest(point, Vec3::ZERO, opposed_m);
-        let weights = [&facing, &nearest].map(|hit| self.skinning.weights_at(hit));
+        let facing = self.trees.whole.closest(point, normal, opposed_m);
+        let nearest = self.trees.whole.closest(point, Vec3::ZERO, opposed_m);
+        let weights = [(&facing, normal), (&nearest, Vec3::ZERO)]
+            .map(|(hit, normal)| self.skinning.weights_near(self.trees, hit, point, normal));
         let mut features = [0.0; BODY_FEATURES];
         let mut normal_in_canonical = normal;
         for (candidate, hit) in [&facing, &nearest].into_iter().enumerate() {

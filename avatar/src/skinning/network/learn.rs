@@ -48,8 +48,8 @@ impl<'a> Lesson<'a> {
         rng: &mut StdRng,
     ) -> Self {
         let posed = person.model.pose(&cloud.registered);
-        let tree = person.posed_tree(&posed);
-        let around = Surroundings::posed(person, &tree, &posed, &person.rest_joints());
+        let trees = person.posed_trees(&posed);
+        let around = Surroundings::posed(person, &trees, &posed, &person.rest_joints());
         let turn = random_turn(rng);
         let turned: Vec<Vec3> = cloud.points.iter().map(|&point| turn * point).collect();
         let mut truth = cloud.weights.clone();

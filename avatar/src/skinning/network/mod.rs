@@ -18,7 +18,7 @@ pub mod train;
 
 use std::sync::Arc;
 
-use effigy_registration::{PosedBody, smpl::JOINT_COUNT};
+use effigy_registration::{BodyModel, PosedBody, smpl::JOINT_COUNT};
 use glam::Vec3;
 use rayon::prelude::*;
 
@@ -32,7 +32,9 @@ use self::{
     mixture::{MIXTURE_OUTPUTS, Mixture},
     net::{Cloud, Net},
 };
-use super::{BoneWeights, ClosestBodyPoint, SkinnedPoint, Skinning, fold_extremities};
+use super::{
+    BoneWeights, ClosestBodyPoint, ClosestBodyPointConfig, SkinnedPoint, Skinning, fold_extremities,
+};
 use crate::hyper::Provenance;
 
 /// A network's layers and numbers.
@@ -139,6 +141,12 @@ fn bare_cloud(points: &[Vec3]) -> Cloud {
     }
 }
 
+/// The body that networks look at, in training as later: loose cloth may hang from both legs.
+fn beside(model: Arc<BodyModel>, betas: &[f32; 10]) -> ClosestBodyPoint {
+    let config = ClosestBodyPointConfig { both_legs: 4.0, ..ClosestBodyPointConfig::default() };
+    ClosestBodyPoint::new(model, betas, config)
+}
+
 /// Skinning of one person by the networks.
 ///
 /// Points without normals are no surface (empty space beside the person, say): those are skinned by the closest
@@ -150,7 +158,8 @@ pub struct NetworkSkinning {
 }
 
 impl NetworkSkinning {
-    pub fn new(networks: Arc<SkinningNetworks>, closest: ClosestBodyPoint) -> Self {
+    pub fn new(networks: Arc<SkinningNetworks>, model: Arc<BodyModel>, betas: &[f32; 10]) -> Self {
+        let closest = beside(model, betas);
         let rest_joints = closest.rest_joints();
         Self { networks, closest, rest_joints }
     }
@@ -161,9 +170,13 @@ impl Skinning for NetworkSkinning {
         if normals.is_empty() {
             return self.closest.inverse(posed, points, normals);
         }
-        let tree = self.closest.posed_tree(posed);
-        let around = Surroundings::posed(&self.closest, &tree, posed, &self.rest_joints);
+        let trees = self.closest.posed_trees(posed);
+        let around = Surroundings::posed(&self.closest, &trees, posed, &self.rest_joints);
         skin(&self.networks.inverse, &around.describe(points, normals))
+    }
+
+    fn looks_around(&self) -> bool {
+        true
     }
 
     fn forward(&self, points_in_canonical: &[Vec3], normals: &[Vec3]) -> Vec<SkinnedPoint> {

@@ -12,14 +12,14 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    SkinningNetwork, SkinningNetworks,
+    SkinningNetwork, SkinningNetworks, beside,
     learn::{Lesson, Outcome, Outcomes},
     loss::SkinningLossConfig,
 };
 use crate::{
     error::AvatarError,
     nn::{AdamConfig, AdamStep, Threads, ThreadsConfig, adam::Moments},
-    skinning::{BoneWeights, ClosestBodyPoint, ClosestBodyPointConfig, Warp},
+    skinning::{BoneWeights, ClosestBodyPoint, Warp},
 };
 
 mod checkpoint;
@@ -158,10 +158,7 @@ pub fn train_skinning(
         let people = source.people();
         let people = people
             .par_iter()
-            .map(|betas| {
-                let config = ClosestBodyPointConfig::default();
-                ClosestBodyPoint::new(Arc::clone(model), betas, config)
-            })
+            .map(|betas| beside(Arc::clone(model), betas))
             .collect();
         let training = Training { source, config, checkpoint, people, body: model.identity };
         training.run(state, on_progress)

@@ -16,6 +16,7 @@ mod views;
 
 use std::path::Path;
 
+use anyhow::bail;
 use effigy_registration::smpl::builtin;
 use effigy_sim_sensor::dataset::Dataset;
 
@@ -29,7 +30,7 @@ use self::{
     subject::{Entries, Subject, chosen},
 };
 pub(crate) use self::{
-    plan::{Camera, Table},
+    plan::{Camera, Method, Table},
     subject::Lesson,
     views::Views,
 };
@@ -54,7 +55,18 @@ pub(super) fn run(args: &EvaluateAvatarArgs, data: &Path) -> anyhow::Result<()> 
     let prior = settings.prior_network(body.identity)?.provenance;
     split::check(dataset.manifest(), &prior)?;
     let mut people = chosen(&dataset, args.all);
+    let names: Vec<String> = people
+        .iter()
+        .map(|entries| subject::name(entries))
+        .collect();
     people.retain(|entries| args.wants(&subject::name(entries)));
+    if people.is_empty() {
+        bail!(
+            "nobody in {} is called so; choose among {} (with --all there may be more)",
+            data.display(),
+            names.join(", ")
+        );
+    }
     if args.quick {
         people.truncate(1);
     }
@@ -100,7 +112,9 @@ struct Evaluation<'a> {
 
 impl Evaluation<'_> {
     fn people(&mut self, people: &[Entries]) -> anyhow::Result<()> {
-        let jobs = jobs(self.args.tables(), self.args.quick);
+        let mut jobs = jobs(self.args.tables(), self.args.quick);
+        let methods = &self.args.methods;
+        jobs.retain(|job| methods.is_empty() || methods.contains(&job.method));
         let progress = Progress::new("evaluating", Some((people.len() * jobs.len()) as u64));
         let mut done = 0;
         for entries in people {

@@ -7,10 +7,7 @@ use std::{collections::BTreeMap, f32::consts::FRAC_PI_4, fmt::Write as _, sync::
 
 use effigy_avatar::{
     canonicalise::canonical_places,
-    skinning::{
-        ClosestBodyPoint, ClosestBodyPointConfig, NetworkSkinning, SkinningNetworks, Warp,
-        fold_extremities,
-    },
+    skinning::{ClosestBodyPoint, NetworkSkinning, SkinningNetworks, Warp, fold_extremities},
 };
 use effigy_fusion::clean::Cleaner;
 use effigy_registration::{BodyModel, smpl::builtin};
@@ -112,12 +109,17 @@ pub(super) fn run(args: &EvaluateSkinningArgs) -> anyhow::Result<()> {
     }
     let body = builtin::body();
     let dataset = Dataset::open(&args.data, &body)?;
-    let networks = Arc::new(SkinningNetworks::load(&args.networks, body.identity)?);
+    let networks = match &args.networks {
+        Some(path) => SkinningNetworks::load(path, body.identity)?,
+        None => SkinningNetworks::shipped(body.identity)?,
+    };
+    let networks = Arc::new(networks);
     let entries: Vec<&SequenceEntry> = dataset
         .manifest()
         .sequences
         .iter()
         .filter(|entry| entry.plan.split == Split::Test)
+        .filter(|entry| entry.plan.outfit.name().contains(&args.outfit))
         .collect();
     let progress = Progress::new("skinning", Some(entries.len() as u64));
     let mut sums = BTreeMap::new();
@@ -161,12 +163,9 @@ fn judge(
     let settings = Settings::default();
     let sequence = dataset.load(entry)?;
     let clock = Clock::start();
-    let config = ClosestBodyPointConfig::default();
-    let closest = ClosestBodyPoint::new(Arc::clone(body), &sequence.betas, config.clone());
-    let network = NetworkSkinning::new(
-        Arc::clone(networks),
-        ClosestBodyPoint::new(Arc::clone(body), &sequence.betas, config),
-    );
+    let config = settings.canonicalise.closest_body_point.clone();
+    let closest = ClosestBodyPoint::new(Arc::clone(body), &sequence.betas, config);
+    let network = NetworkSkinning::new(Arc::clone(networks), Arc::clone(body), &sequence.betas);
     let mut cleaner = Cleaner::new(protocol_calibration(), settings.clean.clone());
     let places = crate::pipeline::evaluate::evenly_placed(sequence.frames.len(), frames);
     for (number, frame) in places.into_iter().enumerate() {
