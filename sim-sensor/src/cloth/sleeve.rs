@@ -16,8 +16,9 @@ const FIRST_STATION: f32 = 0.35;
 const LEAST_POINTS: usize = 6;
 /// How far a ring's middle may be from the arm's, beyond its ease.
 const SAG_M: f32 = 0.012;
-/// How far a ring may slide along its arm from where it was cut, either way, before that counts as leaving it.
-const SLIDE_M: f32 = 0.03;
+/// How far a ring may slide along its arm from where it was cut, either way, before that counts as leaving it: on the
+/// upper arm, where shoulders draw sleeves along, and on the forearm.
+const SLIDE_M: [f32; 2] = [0.10, 0.03];
 
 /// Shoulder, elbow, wrist and hand of both arms.
 pub(super) type ArmAxes = [[Vec3; 4]; 2];
@@ -30,6 +31,7 @@ pub(super) struct Ring {
     points: Vec<u32>,
     /// Where it was cut, along shoulder, elbow, wrist and hand.
     home_m: f32,
+    slide_m: f32,
     most_m: f32,
 }
 
@@ -56,7 +58,9 @@ pub(super) fn rings(form: &Form, sheet: &Sheet, arms: &[Option<Arm>]) -> Vec<Rin
                 form.tree.query(point).point.distance(point)
             });
             let ease_m = eases_m.sum::<f32>() / points.len() as f32;
-            Ring { arm: Arm::BOTH[side], points, home_m, most_m: SAG_M + ease_m }
+            let elbow_m = axes[side][0].distance(axes[side][1]);
+            let slide_m = SLIDE_M[usize::from(home_m > elbow_m)];
+            Ring { arm: Arm::BOTH[side], points, home_m, slide_m, most_m: SAG_M + ease_m }
         })
         .collect()
 }
@@ -83,7 +87,7 @@ impl Ring {
     /// From where on its arm the ring's middle may be to where it is.
     fn aside(&self, points: &[Vec3], axes: &ArmAxes) -> Vec3 {
         let middle = middle_of(&self.points, points);
-        let reach_m = self.home_m - SLIDE_M..=self.home_m + SLIDE_M;
+        let reach_m = self.home_m - self.slide_m..=self.home_m + self.slide_m;
         middle - nearest_on(&axes[self.arm as usize], middle, reach_m).1
     }
 }
@@ -127,7 +131,13 @@ mod tests {
             [Vec3::ZERO, Vec3::X, Vec3::X * 2.0, Vec3::X * 2.2],
             [Vec3::Y; 4],
         ];
-        let ring = Ring { arm: Arm::Left, points: vec![0, 1, 2, 3], home_m: 1.5, most_m: 0.03 };
+        let ring = Ring {
+            arm: Arm::Left,
+            points: vec![0, 1, 2, 3],
+            home_m: 1.5,
+            slide_m: 0.05,
+            most_m: 0.03,
+        };
         let around = [Vec3::Y, Vec3::Z, -Vec3::Y, -Vec3::Z].map(|out| Vec3::X * 1.5 + out * 0.06);
         let mut points = around;
         ring.hold(&mut points, &axes);
@@ -154,18 +164,19 @@ mod tests {
             ],
             [Vec3::Y; 4],
         ];
-        let ring = Ring { arm: Arm::Left, points: vec![0, 1], home_m: 1.5, most_m: 0.03 };
+        let ring =
+            Ring { arm: Arm::Left, points: vec![0, 1], home_m: 1.5, slide_m: 0.05, most_m: 0.03 };
         let mut points = [Vec3::Z, -Vec3::Z].map(|out| vec3(1.0, 0.2, 0.0) + out * 0.06);
         ring.hold(&mut points, &axes);
         let middle = 0.5 * (points[0] + points[1]);
-        let expected = vec3(1.0, 0.5 - SLIDE_M - 0.03, 0.0);
+        let expected = vec3(1.0, 0.5 - ring.slide_m - 0.03, 0.0);
         assert!(middle.distance(expected) < 1e-6, "{middle}");
         // A bent arm: the ring belongs to the forearm, though the upper arm is nearer.
         let mut points = [Vec3::Z, -Vec3::Z].map(|out| vec3(0.5, 0.1, 0.0) + out * 0.06);
         ring.hold(&mut points, &axes);
         let middle = 0.5 * (points[0] + points[1]);
         assert!(
-            middle.distance(vec3(1.0, 0.5 - SLIDE_M, 0.0)) < 0.031,
+            middle.distance(vec3(1.0, 0.5 - ring.slide_m, 0.0)) < 0.031,
             "{middle}"
         );
     }

@@ -231,7 +231,7 @@ impl Cloth {
 
     /// Where every point is outside of everything, without a push that would move it on.
     pub(super) fn push_out(&mut self, obstacles: &[Obstacle<'_>]) {
-        for _ in 0..4 {
+        for _ in 0..2 {
             self.find_contacts(obstacles);
             for contact in &mut self.contacts {
                 contact.push(&mut self.points);
