@@ -212,7 +212,7 @@ fn in_color(sequence: &Sequence, frame: usize, azimuth_rad: f32) -> Picture {
     let mesh = sequence.posed_mesh(frame);
     let fine_px = TILE_PX.map(|side| side * 2);
     let camera = PictureCamera::around(&mesh.vertices, azimuth_rad, ELEVATION_RAD, fine_px);
-    let view = sequence.in_color(frame, camera.intrinsics, camera.camera_from_world.inverse());
+    let view = sequence.in_color(&mesh, camera.intrinsics, camera.camera_from_world.inverse());
     let mut picture = Picture::new(fine_px[0], fine_px[1]);
     for ((pixel, color), depth_m) in picture.pixels_mut().zip(view.shaded()).zip(&view.depth_m) {
         *pixel = image::Rgb(if *depth_m > 0.0 {

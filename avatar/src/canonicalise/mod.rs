@@ -73,6 +73,7 @@ pub struct CanonicaliseConfig {
     /// How a keyframe's neighbours in time are averaged with it, where there are any.
     pub snippet: SnippetConfig,
     pub skinning: SkinningChoice,
+    /// Of [`SkinningChoice::ClosestBodyPoint`]; networks look at the body as they did in training.
     pub closest_body_point: ClosestBodyPointConfig,
     pub seed: u64,
 }

@@ -27,8 +27,8 @@ pub struct ClosestBodyPointConfig {
     /// Points this far off the body take weights averaged over about that radius, so that weights
     /// change slowly where the closest point jumps.
     pub full_smoothing_m: f32,
-    /// Points off the legs take weights of both where the farther leg is not farther than this many times the
-    /// nearer one's distance more: a skirt hangs from both, and must not tear between them. 0 for the nearer one's.
+    /// Points off the legs take weights of both: a skirt must not tear between them. The farther leg has no say once
+    /// it is this many times the nearer one's distance farther away than that one; 0 turns this off.
     pub both_legs: f32,
 }
 
@@ -46,15 +46,19 @@ const OFF_LEG_M: [f32; 2] = [0.02, 0.05];
 /// Levels of smoothing between none and full.
 const SMOOTHING_LEVELS: usize = 4;
 
-/// A body in one pose: all of it, and each leg.
+/// A body in one pose: all of it, and each leg where both may have a say.
 pub(super) struct BodyTrees {
     pub(super) whole: OrientedBvh,
-    legs: [OrientedBvh; 2],
+    legs: Option<[OrientedBvh; 2]>,
 }
 
 impl BodyTrees {
-    fn new(model: &BodyModel, vertices: &[Vec3]) -> Self {
+    fn new(model: &BodyModel, vertices: &[Vec3], config: &ClosestBodyPointConfig) -> Self {
         let normals = vertex_normals(vertices, &model.triangles);
+        let whole = OrientedBvh::new(vertices, &normals, &model.triangles);
+        if config.both_legs <= 0.0 {
+            return Self { whole, legs: None };
+        }
         let labels = model.part_labels();
         let leg = |bones: [usize; 4]| {
             let is_legs = |v: &u32| bones.contains(&usize::from(labels[*v as usize]));
@@ -62,10 +66,7 @@ impl BodyTrees {
             let triangles: Vec<[u32; 3]> = of_leg.copied().collect();
             OrientedBvh::new(vertices, &normals, &triangles)
         };
-        Self {
-            whole: OrientedBvh::new(vertices, &normals, &model.triangles),
-            legs: LEGS.map(leg),
-        }
+        Self { whole, legs: Some(LEGS.map(leg)) }
     }
 }
 
@@ -86,7 +87,7 @@ impl ClosestBodyPoint {
         let star = star_body(&model, betas);
         let rest_joints = model.joints(&model.shaped_vertices(betas));
         let levels = smoothing_levels(&model, &star, config.full_smoothing_m);
-        let star_body = BodyTrees::new(&model, &star);
+        let star_body = BodyTrees::new(&model, &star, &config);
         Self { model, config, rest_joints, star, star_body, levels }
     }
 
@@ -97,7 +98,7 @@ impl ClosestBodyPoint {
 
     /// The trees over this model's body in a pose.
     pub(super) fn posed_trees(&self, posed: &PosedBody) -> BodyTrees {
-        BodyTrees::new(&self.model, &posed.vertices)
+        BodyTrees::new(&self.model, &posed.vertices, &self.config)
     }
 
     fn skin(&self, body: &BodyTrees, points: &[Vec3], normals: &[Vec3]) -> Vec<SkinnedPoint> {
@@ -127,13 +128,16 @@ impl ClosestBodyPoint {
         normal: Vec3,
     ) -> BoneWeights {
         let own = self.weights_at(hit);
+        let Some(legs) = &body.legs else {
+            return own;
+        };
         let on_legs: f32 = LEGS.as_flattened().iter().map(|&bone| own[bone]).sum();
         let say = smoothstep(OFF_LEG_M, hit.distance_m) * smoothstep([0.0, 0.5], on_legs);
-        if say <= 0.0 || self.config.both_legs <= 0.0 {
+        if say <= 0.0 {
             return own;
         }
         let opposed_m = self.config.opposed_normal_m;
-        let hits = [0, 1].map(|side| body.legs[side].closest(point, normal, opposed_m));
+        let hits = [0, 1].map(|side| legs[side].closest(point, normal, opposed_m));
         let [left_m, right_m] = hits.map(|hit| hit.cost_m);
         let range_m = self.config.both_legs * left_m.min(right_m).max(1e-6);
         let left = smoothstep([-range_m, range_m], right_m - left_m);
@@ -225,10 +229,8 @@ mod tests {
         let own = ClosestBodyPoint::new(body, &[0.0; 10], ClosestBodyPointConfig::default());
         let joints = star_joints(&own);
         let between = 0.5 * (joints[4] + joints[5]);
-        let share = |point: &SkinnedPoint, side: usize| -> f32 {
-            LEGS[side].iter().map(|&bone| point.weights[bone]).sum()
-        };
-        let left = |point: &SkinnedPoint| share(point, 0);
+        let left =
+            |point: &SkinnedPoint| -> f32 { LEGS[0].iter().map(|&bone| point.weights[bone]).sum() };
         // In front of the middle between the knees, to either side of it.
         let front = [-0.02, 0.0, 0.02].map(|x| between + Vec3::new(x, 0.0, 0.08));
         let weights = both.forward(&front, &[]);

@@ -3,7 +3,7 @@
 use std::{f32::consts::PI, sync::Arc};
 
 use effigy_capture::{Calibration, DepthImage, Frame, Intrinsics, Rigid3, Timestamp};
-use effigy_fusion::mesh::z_buffer::Rasterizer;
+use effigy_fusion::mesh::{TriangleMesh, z_buffer::Rasterizer};
 use glam::{Quat, Vec3};
 
 use super::{plan::KEPT_RATE_HZ, sequence::Sequence};
@@ -67,11 +67,15 @@ impl Sequence {
         )
     }
 
-    /// The person of a frame as a colour camera sees them, with nothing around them.
-    pub fn in_color(&self, frame: usize, camera: Intrinsics, world_from_camera: Rigid3) -> View {
+    /// One of the posed surfaces as a colour camera sees it, with nothing around it.
+    pub fn in_color(
+        &self,
+        posed: &TriangleMesh,
+        camera: Intrinsics,
+        world_from_camera: Rigid3,
+    ) -> View {
         let mut renderer = self.renderer(camera, world_from_camera, Room::Empty);
-        let mesh = self.posed_mesh(frame);
-        renderer.render(&mesh, &self.paint(), &self.weights).clone()
+        renderer.render(posed, &self.paint(), &self.weights).clone()
     }
 
     /// What a real sensor would deliver of a frame, with its noise, and the calibration that belongs to it

@@ -60,7 +60,7 @@ pub(super) fn run(args: &EvaluateAvatarArgs, data: &Path) -> anyhow::Result<()> 
         .map(|entries| subject::name(entries))
         .collect();
     people.retain(|entries| args.wants(&subject::name(entries)));
-    if people.is_empty() {
+    if people.is_empty() && !names.is_empty() {
         bail!(
             "nobody in {} is called so; choose among {} (with --all there may be more)",
             data.display(),

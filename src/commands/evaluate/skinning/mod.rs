@@ -5,6 +5,7 @@ mod view;
 
 use std::{collections::BTreeMap, f32::consts::FRAC_PI_4, fmt::Write as _, sync::Arc};
 
+use anyhow::bail;
 use effigy_avatar::{
     canonicalise::canonical_places,
     skinning::{ClosestBodyPoint, NetworkSkinning, SkinningNetworks, Warp, fold_extremities},
@@ -121,6 +122,13 @@ pub(super) fn run(args: &EvaluateSkinningArgs) -> anyhow::Result<()> {
         .filter(|entry| entry.plan.split == Split::Test)
         .filter(|entry| entry.plan.outfit.name().contains(&args.outfit))
         .collect();
+    if entries.is_empty() {
+        bail!(
+            "no test person of {} wears anything with `{}` in its name; `effigy dataset view` lists what there is",
+            args.data.display(),
+            args.outfit
+        );
+    }
     let progress = Progress::new("skinning", Some(entries.len() as u64));
     let mut sums = BTreeMap::new();
     for (number, entry) in entries.iter().enumerate() {
