@@ -100,7 +100,7 @@ pub(super) fn chicken_wings(at: Moment, style: &Style, stance: &mut Stance) {
         abduction_rad: 1.05 + 0.42 * flap * style.amplitude,
         flexion_rad: -0.05,
         twist_rad: 0.80,
-        elbow_rad: 1.95,
+        elbow_rad: 1.75,
     };
     for arm in &mut stance.arms {
         *arm = blend_arm(*arm, wing, held);

@@ -14,7 +14,7 @@ const BEATS: f32 = 6.0;
 
 /// Fists up before the chin.
 const GUARD: Arm =
-    Arm { abduction_rad: 0.30, flexion_rad: 0.55, twist_rad: -0.65, elbow_rad: 2.05 };
+    Arm { abduction_rad: 0.34, flexion_rad: 0.72, twist_rad: -0.65, elbow_rad: 1.75 };
 const STRAIGHT: Arm =
     Arm { abduction_rad: 0.16, flexion_rad: 1.50, twist_rad: 0.0, elbow_rad: 0.22 };
 
