@@ -1,6 +1,6 @@
 //! What can be typed.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use effigy_registration::motion::Routine;
@@ -8,7 +8,10 @@ use effigy_sim_sensor::{MotionChoice, OutfitKind, SensorPreset, dataset::Dataset
 use serde::de::{DeserializeOwned, IntoDeserializer as _, value};
 
 use crate::{
-    commands::evaluate::{Method, Table},
+    commands::{
+        bench::Part,
+        evaluate::{Method, Table},
+    },
     pipeline::settings::MOST_KEYFRAMES,
 };
 
@@ -61,6 +64,9 @@ pub(crate) enum Command {
         after_help = "Example: effigy evaluate tracking --quick --json tracking.json\n         effigy evaluate --data data/cape-like --md table.md"
     )]
     Evaluate(EvaluateArgs),
+    /// Measure how fast this machine runs it
+    #[command(after_help = "Example: effigy bench --json bench.json")]
+    Bench(BenchArgs),
 }
 
 impl Default for Command {
@@ -195,6 +201,26 @@ pub(crate) struct ChainArgs {
     pub(crate) config: Option<PathBuf>,
 }
 
+impl ChainArgs {
+    /// Everything as it is when nothing is typed, without a window.
+    pub(crate) fn headless(out: &Path) -> Self {
+        Self {
+            headless: true,
+            out: out.to_path_buf(),
+            keyframes: None,
+            poses: None,
+            meshes: None,
+            record: None,
+            json: None,
+            screenshot: None,
+            screenshot_after: 0.0,
+            exit_after: None,
+            body: None,
+            config: None,
+        }
+    }
+}
+
 #[derive(Debug, Args)]
 pub(crate) struct ImportArgs {
     /// What the input is
@@ -231,9 +257,28 @@ pub(crate) struct ExportArgs {
     /// The binary glTF file to write
     #[arg(long)]
     pub(crate) glb: PathBuf,
+    /// At most so many morph targets carry what clothes do over the motion; 0: clothes stay as they are
+    #[arg(long, default_value_t = 16, value_parser = clap::value_parser!(u8).range(0..=64))]
+    pub(crate) modes: u8,
     /// The body model the avatar was made with, if it was not the built-in one
     #[arg(long, value_name = "FILE")]
     pub(crate) body: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct BenchArgs {
+    /// Only these parts
+    #[arg(long, value_delimiter = ',')]
+    pub(crate) only: Vec<Part>,
+    /// Write all figures here
+    #[arg(long, value_name = "FILE")]
+    pub(crate) json: Option<PathBuf>,
+    /// Few rounds and no paper-size networks: whether it runs, not how fast
+    #[arg(long)]
+    pub(crate) quick: bool,
+    /// Keep what the fusion part worked on, for other programs to be timed on
+    #[arg(long, value_name = "DIR")]
+    pub(crate) keep: Option<PathBuf>,
 }
 
 #[derive(Debug, Args)]
@@ -259,7 +304,7 @@ pub(crate) enum DatasetWhat {
 
 #[derive(Debug, Args)]
 pub(crate) struct DatasetMakeArgs {
-    /// What for: prior (to train on), cape-like (the paper's tables), small (tests)
+    /// What for: prior (to train on), cape-like (the paper's tables), dev (choosing settings), small (tests)
     #[arg(long, value_parser = kebab::<DatasetPreset>)]
     pub(crate) preset: DatasetPreset,
     /// Who the people are

@@ -67,5 +67,6 @@ fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Dataset(args) => commands::dataset::run(&args),
         Command::Train(args) => commands::train::run(&args),
         Command::Evaluate(args) => commands::evaluate::run(&args),
+        Command::Bench(args) => commands::bench::run(&args),
     }
 }

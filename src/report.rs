@@ -17,6 +17,8 @@ pub(crate) struct Report {
     pub(crate) seconds_total: f64,
     pub(crate) peak_memory_mb: Option<f64>,
     pub(crate) frames: FrameCounts,
+    /// From the program's start to the first tracked body.
+    pub(crate) start_up_secs: Option<f64>,
     pub(crate) time_to_first_track_secs: Option<f64>,
     pub(crate) tracked_fraction: Option<f64>,
     pub(crate) keyframes: usize,

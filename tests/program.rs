@@ -429,6 +429,44 @@ fn run_quickly(here: &Path, arguments: &[&str], name: &str) {
     );
 }
 
+#[test]
+fn bench_measures_every_kernel_and_says_what_ratios_are_of() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let arguments = [
+        "bench",
+        "--quick",
+        "--only",
+        "field,drive,fusion",
+        "--json",
+        "b.json",
+        "--keep",
+        "kept",
+    ];
+    let output = effigy(folder.path(), &arguments);
+    assert_succeeds(&output);
+    let text = fs::read(folder.path().join("b.json")).expect("the figures were written");
+    let results: serde_json::Value = serde_json::from_slice(&text).expect("they are JSON");
+    let rows = results["rows"].as_array().expect("they have rows");
+    assert!(rows.len() > 12, "{} rows", rows.len());
+    for row in rows {
+        assert!(row["value"].as_f64().expect("a number") > 0.0, "{row}");
+        assert!(row["unit"].is_string() && row["name"].is_string(), "{row}");
+        assert_eq!(
+            row["ratio"].is_null(),
+            row["compared_with"].is_null(),
+            "{row}"
+        );
+    }
+    for kept in ["depth.png", "grid.f32", "inputs.json"] {
+        assert!(folder.path().join("kept").join(kept).exists(), "{kept}");
+    }
+    assert_fails(
+        &effigy(folder.path(), &["bench", "--only", "nothing"]),
+        USAGE,
+        &["nothing"],
+    );
+}
+
 /// Two keyframes; poses go to `name.json`, all else into the folder `name`.
 fn run(here: &Path, arguments: &[&str], name: &str) {
     let poses = format!("{name}.json");

@@ -168,6 +168,25 @@ impl Driver {
         AvatarMesh { frame, theta: params.theta, canonical, vertices, normals, triangles }
     }
 
+    /// How far each vertex lies along its topology normal from its topology place in the pose of `params`, metres;
+    /// found along normals, whatever the configuration says.
+    pub fn offsets_m(&mut self, params: &BodyParams) -> &[f32] {
+        let subject = &self.avatar.subject;
+        let metres_per_unit = subject.unit_box.metres_per_unit();
+        let sdf = self.avatar.field.field(&subject.pose_input(&params.theta));
+        let longest = self.config.max_offset_m / metres_per_unit;
+        self.points
+            .clone_from(&self.avatar.topology.vertices_in_unit);
+        let steps = match self.config.projection {
+            Projection::AlongNormals { steps } | Projection::AlongGradients { steps } => steps,
+        };
+        self.project_along_normals(&*sdf, steps, longest);
+        for offset in &mut self.offsets {
+            *offset *= metres_per_unit;
+        }
+        &self.offsets
+    }
+
     /// Moves the topology's vertices onto the zero level of this field; the result is in `self.points`.
     fn project(&mut self, sdf: &dyn SignedDistanceField) {
         let longest = self.config.max_offset_m / self.avatar.subject.unit_box.metres_per_unit();

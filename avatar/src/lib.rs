@@ -4,6 +4,7 @@
 //! In: `effigy_registration::RegisteredFrame`s. Out: an avatar that can be posed. Works in `canonical`
 //! (star pose, metres) and `unit` space (canonical in [-1, 1]^3).
 
+pub mod bake;
 pub mod baselines;
 pub mod canonicalise;
 pub mod checkpoint;
@@ -27,6 +28,7 @@ pub mod skinning;
 #[cfg(test)]
 mod testing;
 
+pub use bake::{Bake, BakeConfig, BakeError};
 pub use canonicalise::{CanonicaliseConfig, Canonicaliser};
 pub use drive::{AvatarMesh, DriveConfig, Driver, extract_posed};
 pub use error::AvatarError;

@@ -94,7 +94,7 @@ fn volumes(criterion: &mut Criterion) {
         .expect("the size fits");
     let camera = CAMERA.into();
     let depth_view = DepthView {
-        depth: &clean.depth,
+        points: &clean.vertices,
         normals: Some(&clean.normals),
         camera: &camera,
         volume_from_camera: Rigid3::IDENTITY,

@@ -1,7 +1,7 @@
 //! A frame made metric, denoised, and reduced to the person.
 
 use effigy_capture::{Calibration, Frame, FrameId, Timestamp};
-use glam::Vec3;
+use glam::{Vec3, Vec4};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -95,7 +95,7 @@ pub struct Cleaner {
     bilateral: Bilateral,
     bodies: Vec<Body>,
     scratch_depth: Vec<f32>,
-    scratch_normals: Vec<Vec3>,
+    scratch_normals: Vec<Vec4>,
     spare: Option<Spare>,
 }
 

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use effigy_capture::{CameraModel, DepthImage};
-use glam::{Vec2, Vec3};
+use glam::{Vec2, Vec3, Vec4};
 use rayon::prelude::*;
 
 /// Neighbours whose depths differ by more than this share of the depth lie on different surfaces: a surface
@@ -160,7 +160,7 @@ impl NormalMap {
         normals: Vec<Vec3>,
         vertices: &VertexMap,
         region: &Region,
-        rough: &mut Vec<Vec3>,
+        rough: &mut Vec<Vec4>,
     ) -> Self {
         let (width, height) = (vertices.width, vertices.height);
         let mut map = Self { width, height, normals };
@@ -169,97 +169,133 @@ impl NormalMap {
         }
         let columns = region.columns.len();
         // What is left in it from before is overwritten.
-        rough.resize(columns * region.rows.len(), Vec3::ZERO);
+        rough.resize(columns * region.rows.len(), Vec4::ZERO);
         rough
             .par_chunks_mut(columns)
+            .with_min_len(ROWS_A_TASK)
             .enumerate()
             .for_each(|(row, normals)| {
-                for (column, normal) in normals.iter_mut().enumerate() {
-                    *normal = rough_normal(
-                        vertices,
-                        region.columns.start + column,
-                        region.rows.start + row,
-                    );
-                }
+                rough_normals(
+                    vertices,
+                    region.columns.start,
+                    region.rows.start + row,
+                    normals,
+                );
             });
-        let patch = Patch { vertices, region, rough };
+        let patch = Patch { rough, columns, rows: region.rows.len() };
         let rows = region.rows.start * width..region.rows.end * width;
         map.normals[rows]
             .par_chunks_mut(width)
+            .with_min_len(ROWS_A_TASK)
             .enumerate()
-            .for_each(|(row, normals)| {
-                for column in region.columns.clone() {
-                    normals[column] = patch.smooth_normal(column, region.rows.start + row);
-                }
-            });
+            .for_each(|(row, normals)| patch.smooth(row, &mut normals[region.columns.clone()]));
         map
     }
 }
 
-/// A vector along the normal, from the nearest points on the same surface left, right, above and below;
-/// zero where there is none.
-fn rough_normal(vertices: &VertexMap, x: usize, y: usize) -> Vec3 {
+/// Fewer rows are not worth another thread's attention.
+const ROWS_A_TASK: usize = 16;
+
+/// For each pixel of a row from `first` on, a vector along the normal, from the nearest points on the same surface left,
+/// right, above and below, zero where there is none; and the pixel's depth beside it.
+fn rough_normals(vertices: &VertexMap, first: usize, y: usize, normals: &mut [Vec4]) {
     let (width, height) = (vertices.width, vertices.height);
-    let here = y * width + x;
-    let center = vertices.points[here];
-    if center.z.is_nan() {
-        return Vec3::ZERO;
-    }
-    let limit_m = STEP_SHARE * center.z;
-    let neighbour = |inside: bool, index: usize| {
-        let point = if inside {
-            vertices.points[index]
-        } else {
-            Vec3::NAN
-        };
-        // A NaN compares as false.
-        if (point.z - center.z).abs() < limit_m {
-            point
-        } else {
-            center
-        }
+    let row = |y: usize| &vertices.points[y * width..(y + 1) * width];
+    let here = row(y);
+    // Beyond the picture there is nothing: a row compared with itself gives no vector.
+    let above = if y >= REACH_PX {
+        row(y - REACH_PX)
+    } else {
+        here
     };
-    let left = neighbour(x >= REACH_PX, here.wrapping_sub(REACH_PX));
-    let right = neighbour(x + REACH_PX < width, here + REACH_PX);
-    let above = neighbour(y >= REACH_PX, here.wrapping_sub(REACH_PX * width));
-    let below = neighbour(y + REACH_PX < height, here + REACH_PX * width);
-    // Right cross down points away from the camera.
-    (below - above).cross(right - left)
+    let below = if y + REACH_PX < height {
+        row(y + REACH_PX)
+    } else {
+        here
+    };
+    for (x, normal) in (first..).zip(normals) {
+        let center = here[x];
+        let limit_m = STEP_SHARE * center.z;
+        let on_surface = |point: Vec3| {
+            // A NaN compares as false.
+            if (point.z - center.z).abs() < limit_m {
+                point
+            } else {
+                center
+            }
+        };
+        let left = on_surface(here[x.saturating_sub(REACH_PX)]);
+        let right = on_surface(here[(x + REACH_PX).min(width - 1)]);
+        let (left, right) = (
+            if x >= REACH_PX { left } else { center },
+            if x + REACH_PX < width { right } else { center },
+        );
+        // Right cross down points away from the camera.
+        let vector = (on_surface(below[x]) - on_surface(above[x])).cross(right - left);
+        let vector = if center.z.is_nan() {
+            Vec3::ZERO
+        } else {
+            vector
+        };
+        *normal = vector.extend(center.z);
+    }
 }
 
-/// Rough normals of a region, ready to be smoothed.
+/// Rough normals of a region with their depths, ready to be smoothed.
 struct Patch<'a> {
-    vertices: &'a VertexMap,
-    region: &'a Region,
-    rough: &'a [Vec3],
+    rough: &'a [Vec4],
+    columns: usize,
+    rows: usize,
 }
 
 impl Patch<'_> {
-    /// The sum over three by three neighbours, two pixels apart, on the same surface. Larger triangles
+    /// A row of sums over three by three neighbours, two pixels apart, on the same surface. Larger triangles
     /// count more: they are the ones measured over both sides.
-    fn smooth_normal(&self, x: usize, y: usize) -> Vec3 {
-        let width = self.vertices.width;
-        let center = self.vertices.points[y * width + x].z;
-        if center.is_nan() {
-            return Vec3::NAN;
-        }
-        let limit_m = STEP_SHARE * center;
-        let Region { columns, rows } = self.region;
-        let mut sum = Vec3::ZERO;
-        for at_y in [y.wrapping_sub(REACH_PX), y, y + REACH_PX] {
-            if !rows.contains(&at_y) {
-                continue;
-            }
-            let depths = &self.vertices.points[at_y * width..];
-            let normals = &self.rough[(at_y - rows.start) * columns.len()..];
-            for at_x in [x.wrapping_sub(REACH_PX), x, x + REACH_PX] {
-                if columns.contains(&at_x) && (depths[at_x].z - center).abs() < limit_m {
-                    sum += normals[at_x - columns.start];
-                }
+    fn smooth(&self, y: usize, normals: &mut [Vec3]) {
+        let row = |y: usize| &self.rough[y * self.columns..(y + 1) * self.columns];
+        let here = row(y);
+        let mut near = [here; 3];
+        let mut count = 0;
+        for at in [y.wrapping_sub(REACH_PX), y, y + REACH_PX] {
+            if at < self.rows {
+                near[count] = row(at);
+                count += 1;
             }
         }
-        sum.try_normalize().unwrap_or(Vec3::NAN)
+        let near = &near[..count];
+        for (x, normal) in normals.iter_mut().enumerate() {
+            let center = here[x].w;
+            *normal = if center.is_nan() {
+                Vec3::NAN
+            } else {
+                let sum = if x >= REACH_PX && x + REACH_PX < self.columns {
+                    sum_of(near, [x - REACH_PX, x, x + REACH_PX], center)
+                } else if x >= REACH_PX {
+                    sum_of(near, [x - REACH_PX, x], center)
+                } else if x + REACH_PX < self.columns {
+                    sum_of(near, [x, x + REACH_PX], center)
+                } else {
+                    sum_of(near, [x], center)
+                };
+                sum.try_normalize().unwrap_or(Vec3::NAN)
+            };
+        }
     }
+}
+
+/// The vectors at these places whose depth is near this one.
+#[inline]
+fn sum_of<const N: usize>(rows: &[&[Vec4]], places: [usize; N], depth_m: f32) -> Vec3 {
+    let limit_m = STEP_SHARE * depth_m;
+    let mut sum = Vec4::ZERO;
+    for row in rows {
+        for place in places {
+            let vector = row[place];
+            let near = (vector.w - depth_m).abs() < limit_m;
+            sum += if near { vector } else { Vec4::ZERO };
+        }
+    }
+    sum.truncate()
 }
 
 #[cfg(test)]

@@ -9,7 +9,7 @@ use glam::{Quat, Vec3};
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    registered::{RegisteredFrame, Tracking},
+    registered::RegisteredFrame,
     smpl::{BodyParams, JOINT_COUNT},
     state::axis_angle,
 };
@@ -110,22 +110,17 @@ impl Smoother {
         Self { config, memory: None }
     }
 
-    /// Smooths a frame's parameters; a frame without a body starts anew.
-    pub fn process(&mut self, mut frame: RegisteredFrame) -> RegisteredFrame {
+    /// A frame's parameters, smoothed; after a frame without a body it starts anew.
+    pub fn params(&mut self, frame: &RegisteredFrame) -> Option<BodyParams> {
         let SmoothConfig::OneEuro(config) = self.config else {
-            return frame;
+            return frame.params().copied();
         };
-        let timestamp = frame.clean.timestamp;
-        match &mut frame.tracking {
-            Tracking::Tracked { params, .. } => {
-                let memory = self.memory.take();
-                let memory = Memory::after(memory, &Body::of(params), timestamp, &config);
-                memory.smooth.write(params);
-                self.memory = Some(memory);
-            }
-            Tracking::Partial { .. } | Tracking::Lost { .. } => self.memory = None,
-        }
-        frame
+        let memory = self.memory.take();
+        let mut params = *frame.params()?;
+        let memory = Memory::after(memory, &Body::of(&params), frame.clean.timestamp, &config);
+        memory.smooth.write(&mut params);
+        self.memory = Some(memory);
+        Some(params)
     }
 }
 
@@ -209,6 +204,7 @@ mod tests {
     use effigy_fusion::{CleanFrame, DepthMap, NormalMap, VertexMap, clean::PersonVisibility};
 
     use super::*;
+    use crate::registered::Tracking;
 
     const STEP_SECS: f64 = 1.0 / 30.0;
 
@@ -234,8 +230,8 @@ mod tests {
         Tracking::Tracked { params, residual_rms_m: 0.01, joint_confidence }
     }
 
-    fn elbow(frame: &RegisteredFrame) -> Vec3 {
-        frame.params().expect("tracked").theta[18]
+    fn elbow(smoother: &mut Smoother, frame: &RegisteredFrame) -> Vec3 {
+        smoother.params(frame).expect("tracked").theta[18]
     }
 
     /// Noise in -1..1 that is the same each time.
@@ -249,8 +245,8 @@ mod tests {
         let mut smoother = Smoother::new(SmoothConfig::Off);
         for number in 0..20 {
             let tracking = tracked(Vec3::new(0.1, -1.0 + 0.3 * noise(number), 0.2));
-            let out = smoother.process(frame(number, tracking.clone()));
-            assert_eq!(out.tracking, tracking);
+            let frame = frame(number, tracking);
+            assert_eq!(smoother.params(&frame).as_ref(), frame.params());
         }
     }
 
@@ -260,10 +256,10 @@ mod tests {
         let (mut before, mut after) = (0.0, 0.0);
         for number in 0..300 {
             let rotation = Vec3::new(0.0, -0.8 + 0.02 * noise(number), 0.0);
-            let out = smoother.process(frame(number, tracked(rotation)));
+            let smooth = elbow(&mut smoother, &frame(number, tracked(rotation)));
             if number >= 30 {
                 before += (rotation.y + 0.8).powi(2);
-                after += (elbow(&out).y + 0.8).powi(2);
+                after += (smooth.y + 0.8).powi(2);
             }
         }
         // Squared: a ninth of the power.
@@ -278,8 +274,8 @@ mod tests {
             let mut lag_secs = 0.0;
             for number in 0..45 {
                 let angle = rad_per_sec * number as f32 * STEP_SECS as f32 - 1.5;
-                let out = smoother.process(frame(number, tracked(Vec3::Y * angle)));
-                lag_secs = (angle - elbow(&out).y) / rad_per_sec;
+                let smooth = elbow(&mut smoother, &frame(number, tracked(Vec3::Y * angle)));
+                lag_secs = (angle - smooth.y) / rad_per_sec;
             }
             let stated_secs = config.lag_secs(rad_per_sec);
             // A millisecond: single precision over two radians.
@@ -287,7 +283,11 @@ mod tests {
                 (lag_secs - stated_secs).abs() < 1e-3,
                 "{lag_secs} for {stated_secs}"
             );
-            smoother.process(frame(45, Tracking::Lost { since: Timestamp(0) }));
+            assert!(
+                smoother
+                    .params(&frame(45, Tracking::Lost { since: Timestamp(0) }))
+                    .is_none()
+            );
         }
     }
 
@@ -295,10 +295,17 @@ mod tests {
     fn a_body_found_again_starts_where_it_is() {
         let mut smoother = Smoother::new(SmoothConfig::default());
         for number in 0..10 {
-            smoother.process(frame(number, tracked(Vec3::ZERO)));
+            elbow(&mut smoother, &frame(number, tracked(Vec3::ZERO)));
         }
-        smoother.process(frame(10, Tracking::Lost { since: Timestamp(0) }));
-        let out = smoother.process(frame(11, tracked(Vec3::new(0.0, -2.0, 0.0))));
-        assert!((elbow(&out).y + 2.0).abs() < 1e-6);
+        assert!(
+            smoother
+                .params(&frame(10, Tracking::Lost { since: Timestamp(0) }))
+                .is_none()
+        );
+        let found = elbow(
+            &mut smoother,
+            &frame(11, tracked(Vec3::new(0.0, -2.0, 0.0))),
+        );
+        assert!((found.y + 2.0).abs() < 1e-6);
     }
 }

@@ -2,8 +2,9 @@
 
 use std::{collections::BTreeMap, path::Path, sync::Arc};
 
+use anyhow::Context as _;
 use effigy_capture::FrameSource;
-use effigy_registration::{BodyModel, smpl::builtin};
+use effigy_registration::{BodyModel, SmoothConfig, smpl::builtin};
 use effigy_sim_sensor::Truth;
 use effigy_viewer::SnapshotSlot;
 
@@ -39,7 +40,12 @@ pub(crate) struct Input {
     pub(crate) metadata: BTreeMap<String, String>,
     /// What was decided when this recording was made.
     pub(crate) decided: Option<Schedule>,
+    /// How poses were smoothed then.
+    pub(crate) smoothed: Option<SmoothConfig>,
 }
+
+/// Where a recording of a run keeps how its poses were smoothed, so that a replay repeats it.
+pub(crate) const SMOOTH_KEY: &str = "effigy.smooth";
 
 /// Who sets the pace.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -97,6 +103,14 @@ pub(crate) fn report_of(
     let body = body_model(args.body.as_deref())?;
     let mut settings = Settings::load(args.config.as_deref())?;
     settings.keyframes.count = args.keyframes.unwrap_or(settings.keyframes.count);
+    let smooth = *settings
+        .smooth
+        .get_or_insert(match (input.pace, input.smoothed) {
+            (Pace::RealTime, _) => SmoothConfig::default(),
+            (Pace::LockStep, then) => then.unwrap_or(SmoothConfig::Off),
+        });
+    let smooth = serde_json::to_string(&smooth).context("a setting is plain data")?;
+    input.metadata.insert(SMOOTH_KEY.to_owned(), smooth);
     let name = input.source.name();
     let calibration = input.source.calibration().clone();
     // A window is closed when somebody closes it.
@@ -180,6 +194,7 @@ fn report(source: String, log: &RunLog) -> Report {
             lost: log.lost,
             dropped: log.dropped.clone(),
         },
+        start_up_secs: log.start_up_secs,
         time_to_first_track_secs: log.time_to_first_track_secs(),
         tracked_fraction: log.tracked_fraction(),
         keyframes: log.keyframes.len(),

@@ -26,6 +26,7 @@ pub(crate) fn run(args: &DemoArgs) -> anyhow::Result<()> {
             pace: Pace::LockStep,
             metadata: BTreeMap::from([(SCENARIO_KEY.to_owned(), scenario.to_json())]),
             decided: None,
+            smoothed: None,
         })
     };
     chain::run(open, &args.chain)

@@ -10,7 +10,7 @@ use effigy_capture::{
 use effigy_sim_sensor::{Scenario, Truth};
 
 use super::{
-    chain::{self, Input, Pace},
+    chain::{self, Input, Pace, SMOOTH_KEY},
     scene::truth,
     simulate::SCENARIO_KEY,
 };
@@ -28,7 +28,7 @@ pub(crate) fn run(args: &ReplayArgs) -> anyhow::Result<()> {
 }
 
 /// The source; of a recording, also the truth if a simulator left its scenario there, and what was decided live.
-fn open(args: &ReplayArgs) -> anyhow::Result<Input> {
+pub(crate) fn open(args: &ReplayArgs) -> anyhow::Result<Input> {
     let pace = if args.realtime {
         Pace::RealTime
     } else {
@@ -41,6 +41,7 @@ fn open(args: &ReplayArgs) -> anyhow::Result<Input> {
             pace,
             metadata: BTreeMap::new(),
             decided: None,
+            smoothed: None,
         });
     }
     let recording = Recording::open(&args.input)?;
@@ -50,7 +51,18 @@ fn open(args: &ReplayArgs) -> anyhow::Result<Input> {
     let metadata = metadata.into_iter().collect();
     let decided =
         Schedule::recorded(recording.events()).with_context(|| args.input.display().to_string())?;
-    Ok(Input { source: Box::new(Player::new(recording)), truth, pace, metadata, decided })
+    let smoothed = recording
+        .metadata(SMOOTH_KEY)
+        .map(serde_json::from_str)
+        .transpose();
+    let smoothed = smoothed.with_context(|| {
+        format!(
+            "{}: how it was smoothed cannot be read ({SMOOTH_KEY})",
+            args.input.display()
+        )
+    })?;
+    let source = Box::new(Player::new(recording));
+    Ok(Input { source, truth, pace, metadata, decided, smoothed })
 }
 
 /// What the simulator left there, if it can be made again here.

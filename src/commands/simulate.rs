@@ -1,11 +1,11 @@
 //! `effigy simulate`: a simulated sensor, recorded.
 
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, path::Path};
 
 use anyhow::Context as _;
 use effigy_capture::{FrameSource as _, recording::RecordingWriter};
 use effigy_registration::smpl::builtin;
-use effigy_sim_sensor::SimulatedSensor;
+use effigy_sim_sensor::{Scenario, SimulatedSensor};
 
 use super::scene::{SECONDS, scenario};
 use crate::{cli::SimulateArgs, interrupt, progress::Progress, say::say};
@@ -15,10 +15,17 @@ pub(crate) const SCENARIO_KEY: &str = "effigy.scenario";
 
 pub(crate) fn run(args: &SimulateArgs) -> anyhow::Result<()> {
     let scenario = scenario(&args.scene, SECONDS)?;
-    let text = serde_json::to_string(&scenario).context("a scenario is plain data")?;
+    let frames = record(&scenario, &args.out)?;
+    say!("{}: {frames} frames", args.out.display());
+    Ok(())
+}
+
+/// Writes what the sensor sees, with the scenario beside it; how many frames it was.
+pub(crate) fn record(scenario: &Scenario, out: &Path) -> anyhow::Result<u64> {
+    let text = serde_json::to_string(scenario).context("a scenario is plain data")?;
     let metadata = BTreeMap::from([(SCENARIO_KEY.to_owned(), text)]);
-    let mut sensor = SimulatedSensor::new(&scenario, builtin::body())?;
-    let writer = RecordingWriter::create(&args.out, sensor.calibration(), &metadata)?;
+    let mut sensor = SimulatedSensor::new(scenario, builtin::body())?;
+    let writer = RecordingWriter::create(out, sensor.calibration(), &metadata)?;
     let progress = Progress::new("simulating", sensor.frame_count());
     while !interrupt::requested() {
         let Some(frame) = sensor.next_frame()? else {
@@ -28,7 +35,5 @@ pub(crate) fn run(args: &SimulateArgs) -> anyhow::Result<()> {
         progress.advance(frame.id.0 + 1);
     }
     progress.finish();
-    let summary = writer.finish()?;
-    say!("{}: {} frames", args.out.display(), summary.frames);
-    Ok(())
+    Ok(writer.finish()?.frames)
 }

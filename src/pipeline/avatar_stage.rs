@@ -6,7 +6,7 @@ use effigy_avatar::{
     Avatar, AvatarMesh, DriveConfig, Driver, KeyframeSelector, fine_tune::FineTuneProgress,
 };
 use effigy_capture::{CameraModel, FrameId};
-use effigy_registration::{BodyModel, RegisteredFrame};
+use effigy_registration::{BodyModel, RegisteredFrame, SmoothConfig, Smoother};
 
 use super::{
     avatar_job::{AvatarJob, Beside, FinishedAvatar, JobFigures},
@@ -22,6 +22,8 @@ pub(crate) struct AvatarStage {
     schedule: Schedule,
     clock: Clock,
     selector: KeyframeSelector,
+    /// Of the poses that the avatar is driven with; keyframes are taken as they were tracked.
+    smoother: Smoother,
     making: Option<Making>,
     made: Option<Made>,
     gave_up: bool,
@@ -63,6 +65,7 @@ impl AvatarStage {
             schedule,
             clock,
             selector: KeyframeSelector::new(settings.keyframes.clone()),
+            smoother: Smoother::new(settings.smooth.unwrap_or(SmoothConfig::Off)),
             making: None,
             made: None,
             gave_up: false,
@@ -112,12 +115,12 @@ impl AvatarStage {
 
     /// The avatar in the tracked pose, once there is one.
     pub(crate) fn drive(&mut self, registered: &RegisteredFrame) -> Option<AvatarMesh> {
-        let made = self.made.as_mut()?;
-        let params = registered.params()?;
+        let params = self.smoother.params(registered);
+        let (made, params) = (self.made.as_mut()?, params?);
         let id = registered.id();
         Some(
             self.timings
-                .time(&self.clock, "drive", || made.driver.pose(params, id)),
+                .time(&self.clock, "drive", || made.driver.pose(&params, id)),
         )
     }
 

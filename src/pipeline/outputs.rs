@@ -4,7 +4,7 @@ use std::{fs, path::PathBuf, sync::Arc};
 
 use anyhow::Context as _;
 use effigy_avatar::{
-    Avatar, AvatarMesh,
+    Avatar, AvatarMesh, Bake, BakeConfig, BakeError, DriveConfig, Driver,
     export::{GlbOptions, write_glb, write_ply},
 };
 use effigy_capture::{Calibration, Frame};
@@ -24,7 +24,7 @@ use super::{
     run_log::{RunLog, TrackedSample},
     schedule::Decision,
 };
-use crate::{cli::ChainArgs, files, progress::Progress};
+use crate::{cli::ChainArgs, files, interrupt, progress::Progress};
 
 /// How many moments a contact sheet shows.
 const MOMENTS: u64 = 8;
@@ -218,7 +218,9 @@ impl Outputs {
         if let Some(avatar) = avatar {
             avatar.save(&self.out.join("avatar.effigy"))?;
             let motion = self.tracked_motion(log);
-            let options = GlbOptions { motion: Some(&motion), ..GlbOptions::default() };
+            let bake = baked(avatar, &motion)?;
+            let options =
+                GlbOptions { motion: Some(&motion), bake: bake.as_ref(), ..GlbOptions::default() };
             write_glb(&self.out.join("avatar.glb"), avatar, &options)?;
         }
         Ok(())
@@ -229,6 +231,32 @@ impl Outputs {
         let rate_hz = self.calibration.rate_hz;
         Motion { name: "tracked".to_owned(), rate_hz, poses: evenly_timed(&log.tracked, rate_hz) }
     }
+}
+
+/// What the clothes do over a motion; not more keys than take some seconds. `None` where there is no motion, or nobody
+/// wants to wait.
+fn baked(avatar: &Arc<Avatar>, motion: &Motion) -> anyhow::Result<Option<Bake>> {
+    const MOST_KEYS: f32 = 450.0;
+    if motion.poses.is_empty() {
+        return Ok(None);
+    }
+    let config = BakeConfig::default();
+    let affordable = MOST_KEYS / motion.duration_secs().max(1.0);
+    let config = BakeConfig { keys_per_sec: config.keys_per_sec.min(affordable), ..config };
+    let mut driver = Driver::new(Arc::clone(avatar), DriveConfig::default());
+    let bake = Bake::of_motion(&mut driver, motion, &config, &mut |_, _| {
+        !interrupt::requested()
+    })?;
+    if let Some(bake) = &bake {
+        let BakeError { rms_mm, p95_mm, .. } = bake.error;
+        tracing::info!(
+            rms_mm,
+            p95_mm,
+            modes = bake.modes_m.len(),
+            "clothes baked into the GLB"
+        );
+    }
+    Ok(bake)
 }
 
 /// Poses at a steady rate: what was not tracked, or not looked at, is bridged between its neighbours. A source that

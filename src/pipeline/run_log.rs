@@ -86,6 +86,8 @@ pub(crate) struct RunLog {
     /// Where a recording stands.
     pub(crate) playback: Option<PlaybackView>,
     pub(crate) clock: Clock,
+    /// When the first body was there.
+    pub(crate) start_up_secs: Option<f64>,
     learned_from: BTreeSet<FrameId>,
     first_frame: Option<Timestamp>,
     first_track: Option<Timestamp>,
@@ -107,6 +109,7 @@ impl RunLog {
             dropped_so_far: 0,
             playback: None,
             clock,
+            start_up_secs: None,
             learned_from: BTreeSet::new(),
             first_frame: None,
             first_track: None,
@@ -135,6 +138,7 @@ impl RunLog {
             Tracking::Lost { .. } => self.lost += 1,
         }
         if let Some(params) = registered.params() {
+            self.start_up_secs.get_or_insert_with(|| self.clock.secs());
             self.first_track.get_or_insert(registered.clean.timestamp);
             self.tracked.push(TrackedSample {
                 id: registered.id(),

@@ -13,7 +13,7 @@ use effigy_avatar::{
     keyframes::KeyframeConfig,
 };
 use effigy_fusion::clean::CleanConfig;
-use effigy_registration::{smpl::BodyIdentity, track::TrackConfig};
+use effigy_registration::{SmoothConfig, smpl::BodyIdentity, track::TrackConfig};
 use serde::{Deserialize, Serialize};
 
 use crate::files;
@@ -31,6 +31,9 @@ pub(crate) struct Settings {
     pub(crate) prior: Option<PathBuf>,
     pub(crate) clean: CleanConfig,
     pub(crate) track: TrackConfig,
+    /// How the poses that the avatar is driven with are calmed, `"off"` or `{ one_euro = { .. } }`. Where nothing is said:
+    /// live it is done, a recording repeats what was done when it was made, and other replays show what was tracked.
+    pub(crate) smooth: Option<SmoothConfig>,
     pub(crate) keyframes: KeyframeConfig,
     pub(crate) canonicalise: CanonicaliseConfig,
     pub(crate) fine_tune: FineTuneConfig,

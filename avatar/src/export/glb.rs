@@ -19,14 +19,17 @@ use gltf_json::{
 
 use super::{
     buffer::{Bounds, BufferBuilder, Format},
+    morph::{push_targets, push_weights},
     skeleton::{push_joints, push_motion, push_skin},
 };
-use crate::{error::AvatarError, model::Avatar};
+use crate::{bake::Bake, error::AvatarError, model::Avatar};
 
 /// What goes into the file beside skeleton, skin and mesh.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct GlbOptions<'a> {
     pub motion: Option<&'a Motion>,
+    /// Clothes that change with the pose, as morph targets with a weight curve each; baked from this motion.
+    pub bake: Option<&'a Bake>,
     /// One sRGB colour for each topology vertex.
     pub colors: Option<&'a [[u8; 3]]>,
 }
@@ -44,6 +47,9 @@ pub fn write_glb(
 /// The avatar as the bytes of a GLB file.
 pub fn glb_bytes(avatar: &Avatar, options: &GlbOptions<'_>) -> Result<Vec<u8>, AvatarError> {
     check_mesh(avatar, options.colors)?;
+    if let Some(bake) = options.bake {
+        check_bake(avatar, bake)?;
+    }
     if let Some(motion) = options.motion {
         check_motion(motion)?;
     }
@@ -52,7 +58,7 @@ pub fn glb_bytes(avatar: &Avatar, options: &GlbOptions<'_>) -> Result<Vec<u8>, A
     let rest_joints = &avatar.subject.rest_joints;
     let joints = push_joints(&mut root, rest_joints);
     let skin = push_skin(&mut root, &mut buffer, &joints, rest_joints);
-    let mesh = push_mesh(&mut root, &mut buffer, avatar, options.colors);
+    let mesh = push_mesh(&mut root, &mut buffer, avatar, options);
     let body = root.push(Node {
         name: Some("avatar".to_owned()),
         mesh: Some(mesh),
@@ -61,6 +67,9 @@ pub fn glb_bytes(avatar: &Avatar, options: &GlbOptions<'_>) -> Result<Vec<u8>, A
     });
     if let Some(motion) = options.motion.filter(|motion| !motion.poses.is_empty()) {
         push_motion(&mut root, &mut buffer, &joints, rest_joints, motion);
+        if let Some(bake) = options.bake {
+            push_weights(&mut root, &mut buffer, body, bake);
+        }
     }
     let scene = root.push(Scene {
         name: None,
@@ -122,17 +131,40 @@ fn check_motion(motion: &Motion) -> Result<(), AvatarError> {
     Ok(())
 }
 
-/// Vertices in SMPL's zero pose, where one blend of bones is exact.
-fn zero_pose_vertices(avatar: &Avatar) -> Vec<Vec3> {
+fn check_bake(avatar: &Avatar, bake: &Bake) -> Result<(), AvatarError> {
+    let vertices = avatar.topology.vertices_in_unit.len();
+    let lengths = std::iter::once(&bake.mean_m)
+        .chain(&bake.modes_m)
+        .map(Vec::len);
+    if let Some(length) = lengths.into_iter().find(|&length| length != vertices) {
+        return Err(AvatarError::Export(format!(
+            "baked for {length} vertices, the avatar has {vertices}"
+        )));
+    }
+    Ok(())
+}
+
+/// Vertices in SMPL's zero pose, where one blend of bones is exact; moved along the topology's normals by so much.
+fn zero_pose_vertices(avatar: &Avatar, offsets_m: Option<&[f32]>) -> Vec<Vec3> {
     let unit_box = avatar.subject.unit_box;
-    avatar
-        .topology
-        .vertices_in_unit
-        .iter()
+    let topology = &avatar.topology;
+    let places = topology.vertices_in_unit.iter().zip(&topology.normals);
+    places
         .zip(avatar.rest_from_canonical())
-        .map(|(&vertex, rest_from_canonical)| {
-            rest_from_canonical.transform_point3(unit_box.canonical_from_unit(vertex))
+        .enumerate()
+        .map(|(vertex, ((&place, &normal), rest_from_canonical))| {
+            let offset_m = offsets_m.map_or(0.0, |offsets| offsets[vertex]);
+            let canonical = unit_box.canonical_from_unit(place) + normal * offset_m;
+            rest_from_canonical.transform_point3(canonical)
         })
+        .collect()
+}
+
+/// A vertex of nothing but degenerate triangles still needs a unit vector.
+fn unit_normals(avatar: &Avatar, vertices: &[Vec3]) -> Vec<Vec3> {
+    vertex_normals(vertices, &avatar.topology.triangles)
+        .iter()
+        .map(|normal| normal.try_normalize().unwrap_or(Vec3::Y))
         .collect()
 }
 
@@ -140,9 +172,27 @@ fn push_mesh(
     root: &mut Root,
     buffer: &mut BufferBuilder,
     avatar: &Avatar,
-    colors: Option<&[[u8; 3]]>,
+    options: &GlbOptions<'_>,
 ) -> Index<Mesh> {
-    let attributes = push_attributes(root, buffer, avatar, colors);
+    let mean_m = options.bake.map(|bake| &bake.mean_m[..]);
+    let vertices = zero_pose_vertices(avatar, mean_m);
+    let normals = unit_normals(avatar, &vertices);
+    let surface = (&vertices[..], &normals[..]);
+    let attributes = push_attributes(root, buffer, avatar, surface, options.colors);
+    let shapes: Vec<(Vec<Vec3>, Vec<Vec3>)> = options
+        .bake
+        .map_or(&[][..], |bake| &bake.modes_m[..])
+        .iter()
+        .map(|mode| {
+            let sums = mean_m.into_iter().flatten().zip(mode);
+            let offsets_m: Vec<f32> = sums.map(|(mean, shape)| mean + shape).collect();
+            let moved = zero_pose_vertices(avatar, Some(&offsets_m));
+            let turned = unit_normals(avatar, &moved);
+            (moved, turned)
+        })
+        .collect();
+    let targets = push_targets(root, buffer, surface, &shapes);
+    let weights = (!targets.is_empty()).then(|| vec![0.0; targets.len()]);
     let triangles = &avatar.topology.triangles;
     let format = Format {
         component: ComponentType::U32,
@@ -152,7 +202,7 @@ fn push_mesh(
     };
     let bytes = bytemuck::cast_slice(triangles.as_flattened());
     let indices = buffer.push(root, bytes, 3 * triangles.len(), format);
-    let material = push_material(root, colors.is_some());
+    let material = push_material(root, options.colors.is_some());
     let primitive = Primitive {
         attributes: attributes
             .into_iter()
@@ -161,14 +211,14 @@ fn push_mesh(
         indices: Some(indices),
         material: Some(material),
         mode: Valid(Mode::Triangles),
-        targets: None,
+        targets: (!targets.is_empty()).then_some(targets),
         extensions: None,
         extras: Extras::default(),
     };
     root.push(Mesh {
         name: Some("avatar".to_owned()),
         primitives: vec![primitive],
-        weights: None,
+        weights,
         extensions: None,
         extras: Extras::default(),
     })
@@ -178,14 +228,10 @@ fn push_attributes(
     root: &mut Root,
     buffer: &mut BufferBuilder,
     avatar: &Avatar,
+    (vertices, normals): (&[Vec3], &[Vec3]),
     colors: Option<&[[u8; 3]]>,
 ) -> Vec<(Semantic, Index<Accessor>)> {
-    let vertices = zero_pose_vertices(avatar);
-    let normals: Vec<[f32; 3]> = vertex_normals(&vertices, &avatar.topology.triangles)
-        .iter()
-        // A vertex of nothing but degenerate triangles still needs a unit vector.
-        .map(|normal| normal.try_normalize().unwrap_or(Vec3::Y).to_array())
-        .collect();
+    let normals: Vec<[f32; 3]> = normals.iter().map(Vec3::to_array).collect();
     let positions: Vec<[f32; 3]> = vertices.iter().map(Vec3::to_array).collect();
     let (bones, weights) = influences(&avatar.topology.skinning);
     let vector = Format::floats(Type::Vec3).of_vertices();

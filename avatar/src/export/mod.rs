@@ -2,6 +2,7 @@
 
 mod buffer;
 mod glb;
+mod morph;
 mod ply;
 mod skeleton;
 

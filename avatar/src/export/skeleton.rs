@@ -101,7 +101,7 @@ pub(super) fn push_motion(
     root.push(animation);
 }
 
-fn push_channel(
+pub(super) fn push_channel(
     animation: &mut Animation,
     input: Index<Accessor>,
     output: Index<Accessor>,

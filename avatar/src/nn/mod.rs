@@ -20,3 +20,17 @@ pub(crate) mod unet;
 
 pub use adam::{AdamConfig, AdamStep};
 pub use threads::{Threads, ThreadsConfig};
+
+/// `out = left right`, row-major, `right` a square of this width, on one thread: what the kernels are built on, for
+/// measuring how near to it they come.
+///
+/// # Panics
+/// If a slice is too short for the rows that `left` has.
+pub fn square_product(out: &mut [f32], left: &[f32], right: &[f32], width: usize) {
+    let rows = left.len() / width;
+    let (left, right) = (
+        matmul::View::new(left, rows, width),
+        matmul::View::new(right, width, width),
+    );
+    matmul::multiply(out, matmul::Write::Replace, left, right);
+}

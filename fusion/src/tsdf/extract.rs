@@ -87,9 +87,10 @@ mod tests {
             };
             let metres = raster.depth.iter().map(noisy).collect();
             let depth = DepthMap { width: raster.width, height: raster.height, metres };
-            let normals = NormalMap::from_vertices(&VertexMap::unproject(&depth, &rays));
+            let points = VertexMap::unproject(&depth, &rays);
+            let normals = NormalMap::from_vertices(&points);
             let view = DepthView {
-                depth: &depth,
+                points: &points,
                 normals: with_normals.then_some(&normals),
                 camera: &camera,
                 volume_from_camera,
@@ -139,10 +140,10 @@ mod tests {
     #[test]
     fn an_empty_volume_has_no_mesh() {
         let mut volume = TsdfVolume::new(TsdfConfig::default());
-        let depth = DepthMap::empty(320, 288);
+        let points = VertexMap::empty(320, 288);
         let camera = CameraModel::from(CAMERA);
         let view = DepthView {
-            depth: &depth,
+            points: &points,
             normals: None,
             camera: &camera,
             volume_from_camera: Rigid3::IDENTITY,

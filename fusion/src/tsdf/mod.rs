@@ -15,7 +15,7 @@ use serde::{Deserialize, Serialize};
 
 use self::block::Block;
 pub use self::block::{BLOCK_SIDE, Voxel};
-use crate::maps::{DepthMap, NormalMap};
+use crate::maps::{NormalMap, VertexMap};
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -40,7 +40,8 @@ impl Default for TsdfConfig {
 /// One depth map and where it was taken from.
 #[derive(Clone, Copy, Debug)]
 pub struct DepthView<'a> {
-    pub depth: &'a DepthMap,
+    /// What each pixel sees, in the camera's space.
+    pub points: &'a VertexMap,
     /// With normals, distances are measured across the surface instead of along the ray.
     pub normals: Option<&'a NormalMap>,
     pub camera: &'a CameraModel,

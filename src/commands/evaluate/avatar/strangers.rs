@@ -58,6 +58,7 @@ pub(super) fn rows(file: &Path, config: Option<&Path>) -> anyhow::Result<Vec<Row
         pace: Pace::LockStep,
         metadata: BTreeMap::new(),
         decided: None,
+        smoothed: None,
     };
     let name = name(file);
     let out = std::env::temp_dir().join(format!("effigy-{}-{name}", std::process::id()));

@@ -4,7 +4,9 @@ use std::sync::Arc;
 
 use effigy_capture::{Frame, FrameId, Intrinsics, Timestamp};
 use effigy_fusion::clean::Cleaner;
-use effigy_registration::{BodyModel, RegisteredFrame, Tracker};
+use effigy_registration::{
+    BodyModel, BodyParams, RegisteredFrame, SmoothConfig, Smoother, Tracker,
+};
 use effigy_sim_sensor::{SimulatedSensor, StrangerTruth, Truth};
 
 use super::{
@@ -35,13 +37,19 @@ pub(super) fn follow(
             None,
         ),
     };
+    let mut smoother = Smoother::new(SmoothConfig::default());
     let moments = moments(case);
     let mut scores = CaseScores::default();
     for (number, moment) in moments.iter().enumerate() {
         let frame = exposure(&mut sensor, case, number as u64, moment)?;
         let (registered, milliseconds) = chain.process(&frame)?;
+        let smooth = smoother.params(&registered);
         let score = if moment.vanished.is_none() {
-            reality.score(&registered, FrameId(moment.content), milliseconds)
+            reality.score(
+                (&registered, smooth.as_ref()),
+                FrameId(moment.content),
+                milliseconds,
+            )
         } else {
             FrameScore::of_nobody(&registered, milliseconds)
         };
@@ -71,9 +79,16 @@ impl<'a> Reality<'a> {
         Ok(Self::Person { judge: Box::new(judge), truth })
     }
 
-    fn score(&mut self, registered: &RegisteredFrame, content: FrameId, ms: f32) -> FrameScore {
+    fn score(
+        &mut self,
+        (registered, smooth): (&RegisteredFrame, Option<&BodyParams>),
+        content: FrameId,
+        ms: f32,
+    ) -> FrameScore {
         match self {
-            Self::Person { judge, truth } => judge.score(registered, &truth.at(content), ms),
+            Self::Person { judge, truth } => {
+                judge.score(registered, smooth, &truth.at(content), ms)
+            }
             Self::Stranger(judge) => judge.score(registered, content, ms),
         }
     }
@@ -159,6 +174,7 @@ impl FrameScore {
             measured: [false; effigy_registration::smpl::JOINT_COUNT],
             observed: [false; effigy_registration::smpl::JOINT_COUNT],
             errors: None,
+            smooth_errors: None,
         }
     }
 }

@@ -5,7 +5,7 @@ use effigy_fusion::mesh::{
     TriangleMesh,
     z_buffer::{Faces, Raster, Rasterizer},
 };
-use effigy_registration::{BodyModel, RegisteredFrame, Tracking, smpl::JOINT_COUNT};
+use effigy_registration::{BodyModel, BodyParams, RegisteredFrame, Tracking, smpl::JOINT_COUNT};
 use effigy_sim_sensor::GroundTruth;
 use glam::Vec3;
 
@@ -37,6 +37,8 @@ pub(super) struct FrameScore {
     pub(super) observed: [bool; JOINT_COUNT],
     /// Where a body was tracked.
     pub(super) errors: Option<BodyErrors>,
+    /// The same after smoothing; of our own people only.
+    pub(super) smooth_errors: Option<BodyErrors>,
 }
 
 /// What tracking said.
@@ -115,17 +117,22 @@ impl<'a> Judge<'a> {
     pub(super) fn score(
         &mut self,
         registered: &RegisteredFrame,
+        smooth: Option<&BodyParams>,
         truth: &GroundTruth,
         milliseconds: f32,
     ) -> FrameScore {
+        let truth_from_found = truth.world_from_camera * registered.world_from_camera.inverse();
+        let errors =
+            |params: Option<&BodyParams>| Some(self.errors(params?, truth_from_found, truth));
         FrameScore {
             timestamp: registered.clean.timestamp,
             milliseconds,
             present: true,
             state: State::of(&registered.tracking),
             measured: [true; JOINT_COUNT],
+            errors: errors(registered.params()),
+            smooth_errors: errors(smooth),
             observed: self.observed(&truth.clothed_in_world, truth.world_from_camera),
-            errors: self.errors(registered, truth),
         }
     }
 
@@ -134,9 +141,13 @@ impl<'a> Judge<'a> {
         Some(self.body.pose(registered.params()?).joints)
     }
 
-    fn errors(&self, registered: &RegisteredFrame, truth: &GroundTruth) -> Option<BodyErrors> {
-        let found = self.body.pose(registered.params()?);
-        let truth_from_found = truth.world_from_camera * registered.world_from_camera.inverse();
+    fn errors(
+        &self,
+        params: &BodyParams,
+        truth_from_found: Rigid3,
+        truth: &GroundTruth,
+    ) -> BodyErrors {
+        let found = self.body.pose(params);
         let joints: Vec<Vec3> = found
             .joints
             .iter()
@@ -148,13 +159,13 @@ impl<'a> Judge<'a> {
         let v2v_sum_m: f32 = vertices
             .map(|(a, b)| (truth_from_found * *a).distance(*b))
             .sum();
-        Some(BodyErrors {
+        BodyErrors {
             joints_mm: std::array::from_fn(error_mm),
             v2v_mm: Some(1e3 * v2v_sum_m / found.vertices.len() as f32),
             root_m: joints[0].distance(real[0]),
             wrists_mm: [20, 21].map(|wrist| (joints[wrist] - real[wrist]) * 1e3),
             swapped: is_swapped(&joints, real),
-        })
+        }
     }
 
     /// Which joints the camera could see: enough of the clothed surface that they move is in view.

@@ -62,6 +62,7 @@ impl<'a> StrangerJudge<'a> {
             measured,
             observed: std::array::from_fn(|joint| measured[joint] && seen[joint]),
             errors: joints.map(|joints| errors(&joints, &truth.limbs)),
+            smooth_errors: None,
         }
     }
 

@@ -49,6 +49,9 @@ struct Row {
     /// Of the frames in which there was no body, or none where it was said to be.
     false_tracked_fraction: Option<f64>,
     jitter_mm: Option<f64>,
+    /// The same two figures after smoothing as it is by default.
+    jitter_smooth_mm: Option<f64>,
+    mpjpe_smooth_mm: Option<f64>,
     height_error_mm: Option<f64>,
     /// Processor time of cleaning and tracking where a body was followed.
     ms_p50: Option<f64>,
@@ -115,12 +118,8 @@ impl Row {
             sensor: key.sensor,
             outfit: key.outfit,
             frames: cases.iter().map(|(_, scores)| scores.frames.len()).sum(),
-            jitter_mm: root_mean_square(
-                cases
-                    .iter()
-                    .filter(|(case, _)| case.purpose == Purpose::Stillness)
-                    .flat_map(|(_, scores)| wrist_jitter_mm(&scores.frames)),
-            ),
+            jitter_mm: jitter_mm(cases, |frame| frame.errors.as_ref()),
+            jitter_smooth_mm: jitter_mm(cases, |frame| frame.smooth_errors.as_ref()),
             height_error_mm: mean(
                 cases
                     .iter()
@@ -149,6 +148,12 @@ impl Row {
                     .iter()
                     .flat_map(|frame| all_mm(frame))
                     .filter(|mm| mm.is_finite()),
+            ),
+            mpjpe_smooth_mm: mean(
+                frames
+                    .iter()
+                    .filter_map(|frame| frame.smooth_errors.as_ref())
+                    .flat_map(|errors| errors.joints_mm),
             ),
             mpjpe_observed_mm: mean(observed().filter(|mm| mm.is_finite())),
             v2v_mm: mean(errors().filter_map(|errors| errors.v2v_mm)),
@@ -229,9 +234,19 @@ fn errors_mm(frame: &FrameScore, which: &[bool]) -> Vec<f32> {
         .collect()
 }
 
+fn jitter_mm(
+    cases: &[(&Case, &CaseScores)],
+    errors: fn(&FrameScore) -> Option<&BodyErrors>,
+) -> Option<f64> {
+    let still = cases
+        .iter()
+        .filter(|(case, _)| case.purpose == Purpose::Stillness);
+    root_mean_square(still.flat_map(|(_, scores)| wrist_jitter_mm(&scores.frames, errors)))
+}
+
 /// How far each wrist's error strays from its mean within a second, in the last seconds of a stand: what a steady
 /// offset adds is not jitter, and neither is the person's own swaying.
-fn wrist_jitter_mm(frames: &[FrameScore]) -> Vec<f32> {
+fn wrist_jitter_mm(frames: &[FrameScore], of: fn(&FrameScore) -> Option<&BodyErrors>) -> Vec<f32> {
     const WINDOW: usize = 30;
     const WINDOWS: usize = 2;
     let tail = frames.len().saturating_sub(WINDOW * WINDOWS);
@@ -240,7 +255,7 @@ fn wrist_jitter_mm(frames: &[FrameScore]) -> Vec<f32> {
         for side in 0..2 {
             let errors: Vec<_> = window
                 .iter()
-                .filter_map(|frame| frame.errors.as_ref())
+                .filter_map(of)
                 .map(|errors| errors.wrists_mm[side])
                 .collect();
             let middle = errors.iter().sum::<glam::Vec3>() / errors.len().max(1) as f32;
@@ -276,7 +291,7 @@ struct Column {
 }
 
 impl Row {
-    fn columns(&self) -> [Column; 18] {
+    fn columns(&self) -> [Column; 20] {
         let of = |title, value, decimals| Column { title, value, decimals };
         [
             of("mpjpe", self.mpjpe_mm, 1),
@@ -292,6 +307,8 @@ impl Row {
             of("in time", self.reacquired_fraction, 2),
             of("false", self.false_tracked_fraction, 3),
             of("jitter", self.jitter_mm, 1),
+            of("smooth", self.jitter_smooth_mm, 1),
+            of("mpjpe s", self.mpjpe_smooth_mm, 1),
             of("height", self.height_error_mm, 0),
             of("ms p50", self.ms_p50, 1),
             of("ms p99", self.ms_p99, 1),

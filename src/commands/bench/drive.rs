@@ -1,0 +1,128 @@
+//! The avatar in pose after pose, and its mesh extracted in full.
+
+use std::sync::{
+    Arc,
+    atomic::{AtomicUsize, Ordering},
+};
+
+use effigy_avatar::{
+    Avatar, DriveConfig, Driver, SignedDistanceField, Subject, TopologyConfig, hyper, mesher,
+    skinning::{ClosestBodyPoint, ClosestBodyPointConfig},
+};
+use effigy_capture::FrameId;
+use effigy_fusion::mesh::marching_cubes::marching_cubes;
+use effigy_registration::{
+    BodyParams,
+    motion::{Motion, RestBody, Routine},
+    smpl::builtin,
+};
+use glam::Vec3;
+
+use super::{Row, in_turn::in_turn};
+
+/// MetaAvatar's grid, and one that a dense evaluation can afford here.
+const RESOLUTION: usize = 256;
+const DENSE_RESOLUTION: usize = 128;
+
+pub(super) fn rows(quick: bool) -> anyhow::Result<Vec<Row>> {
+    let body = builtin::body();
+    let subject = Subject::new(&body, &[0.0; 10])?;
+    let motion = Routine::Mixture.motion(&RestBody::of(&body, &subject.betas), 30.0, 1);
+    let network = Arc::new(hyper::prior());
+    let skinning = ClosestBodyPoint::new(body, &subject.betas, ClosestBodyPointConfig::default());
+    let theta = motion.poses[0].theta;
+    let topology = TopologyConfig::default();
+    let field = Arc::clone(&network);
+    let avatar = Arc::new(Avatar::new(&subject, field, &skinning, &theta, &topology)?);
+    let mut rows = poses(&avatar, &motion, if quick { 30 } else { 600 });
+    let sdf = network.field(&subject.pose_input(&theta));
+    rows.extend(meshes(&sdf, if quick { 64 } else { RESOLUTION }, quick));
+    Ok(rows)
+}
+
+/// The live drive on its own, each pose another one.
+fn poses(avatar: &Arc<Avatar>, motion: &Motion, count: usize) -> Vec<Row> {
+    let mut driver = Driver::new(Arc::clone(avatar), DriveConfig::default());
+    let vertices = avatar.topology.vertices_in_unit.len();
+    let mut number = 0;
+    let [secs] = in_turn(
+        count,
+        [&mut || {
+            let pose = &motion.poses[number % motion.poses.len()];
+            let params =
+                BodyParams { betas: avatar.subject.betas, theta: pose.theta, trans: pose.trans };
+            driver.pose(&params, FrameId(number as u64));
+            number += 1;
+        }],
+    );
+    vec![
+        Row::new("drive, live", secs.recip(), "poses/s"),
+        Row::new("vertices driven", vertices as f64, ""),
+    ]
+}
+
+/// Following the surface against asking the whole grid.
+fn meshes(sdf: &dyn SignedDistanceField, resolution: usize, quick: bool) -> Vec<Row> {
+    let counting = Counting { sdf, values: AtomicUsize::new(0) };
+    mesher::extract(&counting, resolution);
+    let values = counting.values.into_inner();
+    let [secs] = in_turn(
+        if quick { 1 } else { 5 },
+        [&mut || {
+            mesher::extract(sdf, resolution);
+        }],
+    );
+    let compared = if quick { 32 } else { DENSE_RESOLUTION };
+    let [followed, dense] = in_turn(
+        if quick { 1 } else { 3 },
+        [
+            &mut || {
+                mesher::extract(sdf, compared);
+            },
+            &mut || dense_mesh(sdf, compared),
+        ],
+    );
+    vec![
+        Row::new(format!("mesh, {resolution}^3"), secs, "s"),
+        Row::new(
+            format!("field values for it, {resolution}^3"),
+            values as f64,
+            "",
+        ),
+        Row::new(format!("mesh, {compared}^3"), followed, "s")
+            .against("the dense grid", dense / followed),
+    ]
+}
+
+fn dense_mesh(sdf: &dyn SignedDistanceField, resolution: usize) {
+    let spacing = 2.0 / (resolution - 1) as f32;
+    let layer = resolution * resolution;
+    let mut values = vec![0.0; layer * resolution];
+    let mut points = vec![Vec3::ZERO; layer];
+    for (z, values) in values.chunks_exact_mut(layer).enumerate() {
+        for (place, point) in points.iter_mut().enumerate() {
+            let (x, y) = (place % resolution, place / resolution);
+            *point = Vec3::new(x as f32, y as f32, z as f32) * spacing - 1.0;
+        }
+        sdf.values(&points, values);
+    }
+    marching_cubes(&values, [resolution; 3], Vec3::NEG_ONE, spacing);
+}
+
+/// A field that counts what it is asked.
+struct Counting<'a> {
+    sdf: &'a dyn SignedDistanceField,
+    values: AtomicUsize,
+}
+
+impl SignedDistanceField for Counting<'_> {
+    fn values(&self, points: &[Vec3], out: &mut [f32]) {
+        self.values.fetch_add(points.len(), Ordering::Relaxed);
+        self.sdf.values(points, out);
+    }
+
+    fn values_and_gradients(&self, points: &[Vec3], values: &mut [f32], gradients: &mut [Vec3]) {
+        self.values.fetch_add(2 * points.len(), Ordering::Relaxed);
+        self.sdf.values_and_gradients(points, values, gradients);
+    }
+}
