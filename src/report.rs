@@ -55,6 +55,8 @@ pub(crate) struct FineTuneFigures {
     pub(crate) seconds: f64,
     pub(crate) loss: f32,
     pub(crate) held_out_mm: f32,
+    /// `None` where the drive evaluates the full field.
+    pub(crate) map_p95_mm: Option<f32>,
 }
 
 /// From a frame's delivery to its posed body (and avatar, once there is one).

@@ -9,6 +9,7 @@ use glam::{Affine3A, Vec3};
 use serde::{Deserialize, Serialize};
 
 use crate::{
+    bake::ShapeMap,
     mesher::{self, FieldAt},
     model::Avatar,
     sdf::SignedDistanceField,
@@ -113,6 +114,8 @@ pub struct Driver {
     open: Vec<u32>,
     queries: Vec<Vec3>,
     field_at: FieldAt,
+    /// What gives the offsets without the field, where it knows the pose.
+    map: Option<ShapeMap>,
 }
 
 /// A field flatter than this along a normal is no distance field there; steps stay bounded.
@@ -139,9 +142,15 @@ impl Driver {
             open: Vec::with_capacity(count),
             queries: Vec::with_capacity(count),
             field_at,
+            map: None,
             avatar,
             config,
         }
+    }
+
+    /// Drives without the field where this map of the same avatar knows the pose.
+    pub fn with_map(self, map: ShapeMap) -> Self {
+        Self { map: Some(map), ..self }
     }
 
     pub fn avatar(&self) -> &Arc<Avatar> {
@@ -150,11 +159,11 @@ impl Driver {
 
     /// The avatar in the pose of `params`; the shape is the avatar's own, whatever `params.betas` say.
     pub fn pose(&mut self, params: &BodyParams, frame: FrameId) -> AvatarMesh {
-        let sdf = self
-            .avatar
-            .field
-            .field(&self.avatar.subject.pose_input(&params.theta));
-        self.project(&*sdf);
+        if !self.place_by_map(&params.theta) {
+            let pose = self.avatar.subject.pose_input(&params.theta);
+            let sdf = self.avatar.field.field(&pose);
+            self.project(&*sdf);
+        }
         let unit_box = self.avatar.subject.unit_box;
         let canonical: Vec<Vec3> = self
             .points
@@ -166,6 +175,39 @@ impl Driver {
         let mut normals = Vec::new();
         vertex_normals_into(&vertices, &triangles, &mut normals);
         AvatarMesh { frame, theta: params.theta, canonical, vertices, normals, triangles }
+    }
+
+    /// The pose's coefficients, if the field has such.
+    pub(crate) fn coefficients(&self, theta: &[Vec3; JOINT_COUNT]) -> Option<Vec<f32>> {
+        self.avatar
+            .field
+            .coefficients(&self.avatar.subject.pose_input(theta))
+    }
+
+    /// Leaves the vertices in `self.points`, if there is a map and it knows the pose.
+    fn place_by_map(&mut self, theta: &[Vec3; JOINT_COUNT]) -> bool {
+        let Some(coefficients) = self.map.as_ref().and_then(|_| self.coefficients(theta)) else {
+            return false;
+        };
+        let known = self
+            .map
+            .as_ref()
+            .is_some_and(|map| map.offsets_m(&coefficients, &mut self.offsets));
+        if known {
+            let topology = &self.avatar.topology;
+            let units_per_metre = self.avatar.subject.unit_box.metres_per_unit().recip();
+            let longest_m = self.config.max_offset_m;
+            let places = topology.vertices_in_unit.iter().zip(&topology.normals);
+            self.points.clear();
+            self.points.extend(
+                places
+                    .zip(&self.offsets)
+                    .map(|((&vertex, &normal), offset_m)| {
+                        vertex + normal * (offset_m.clamp(-longest_m, longest_m) * units_per_metre)
+                    }),
+            );
+        }
+        known
     }
 
     /// How far each vertex lies along its topology normal from its topology place in the pose of `params`, metres;

@@ -28,7 +28,7 @@ pub mod skinning;
 #[cfg(test)]
 mod testing;
 
-pub use bake::{Bake, BakeConfig, BakeError};
+pub use bake::{Bake, BakeConfig, BakeError, MapConfig, ShapeMap};
 pub use canonicalise::{CanonicaliseConfig, Canonicaliser};
 pub use drive::{AvatarMesh, DriveConfig, Driver, extract_posed};
 pub use error::AvatarError;

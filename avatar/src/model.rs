@@ -26,6 +26,12 @@ pub trait PoseField: Send + Sync + Any {
     /// The field of one pose.
     fn field(&self, pose: &PoseInput) -> Box<dyn SignedDistanceField>;
 
+    /// The few numbers through which alone the pose enters the field's parameters, if there are such.
+    fn coefficients(&self, pose: &PoseInput) -> Option<Vec<f32>> {
+        let _ = pose;
+        None
+    }
+
     /// What the parameters are of; a reader refuses kinds it does not know.
     fn kind(&self) -> &str;
 

@@ -204,6 +204,7 @@ fn report(source: String, log: &RunLog) -> Report {
             seconds: job.fine_tune_secs,
             loss: job.loss,
             held_out_mm: job.held_out_mm,
+            map_p95_mm: job.map_p95_mm,
         }),
         time_to_first_avatar_secs: log.jobs.first().map(|job| job.total_secs),
         latency_ms: latency(log),

@@ -13,13 +13,16 @@ use std::{
 use anyhow::{Context as _, anyhow};
 use crossbeam::channel::{Receiver, Select, TryRecvError, bounded};
 use effigy_avatar::{
-    Avatar, CanonicalSamples, Canonicaliser, TopologyConfig,
+    Avatar, CanonicalSamples, Canonicaliser, DriveConfig, Driver, ShapeMap, TopologyConfig,
     fine_tune::{FineTuneProgress, fine_tune},
     keyframes::Keyframe,
     nn::Threads,
 };
 use effigy_capture::CameraModel;
-use effigy_registration::BodyModel;
+use effigy_registration::{
+    BodyModel,
+    motion::{Motion, RestBody, Routine},
+};
 
 use super::{clock::Clock, settings::Settings};
 use crate::{interrupt, machine::Machine};
@@ -38,6 +41,16 @@ pub(crate) enum Beside {
     OverloadedChain,
 }
 
+/// What a map learns from beside the actions.
+const MORE_ROUTINES: [Routine; 4] = [
+    Routine::Squat,
+    Routine::RaiseArms,
+    Routine::WalkInPlace,
+    Routine::Wave,
+];
+const MAP_RATE_HZ: f32 = 15.0;
+const MAP_SEED: u64 = 1;
+
 /// A running job; dropping it cancels it.
 pub(crate) struct AvatarJob {
     cancel: Arc<AtomicBool>,
@@ -47,7 +60,9 @@ pub(crate) struct AvatarJob {
 }
 
 pub(crate) struct FinishedAvatar {
-    pub(crate) avatar: Avatar,
+    pub(crate) avatar: Arc<Avatar>,
+    /// Drives it without its field.
+    pub(crate) map: Option<ShapeMap>,
     pub(crate) figures: JobFigures,
 }
 
@@ -58,6 +73,9 @@ pub(crate) struct JobFigures {
     pub(crate) loss: f32,
     pub(crate) held_out_mm: f32,
     pub(crate) fine_tune_secs: f64,
+    /// How far the map that drives it is from the full field, p95 over poses it has not seen; `None` where the field
+    /// drives it.
+    pub(crate) map_p95_mm: Option<f32>,
     /// From the keyframes to an avatar that can be driven.
     pub(crate) total_secs: f64,
 }
@@ -226,14 +244,31 @@ impl Work {
             &middle.theta,
             &TopologyConfig::default(),
         )?;
+        let avatar = Arc::new(avatar);
+        let map = self.map_of(&avatar)?;
         let figures = JobFigures {
             steps: last.step as usize,
             loss: last.loss.total() as f32,
             held_out_mm: last.held_out_residual_m * 1e3,
             fine_tune_secs,
+            map_p95_mm: map.as_ref().map(|map| map.error.p95_mm),
             total_secs: self.clock.secs() - started,
         };
-        Ok(FinishedAvatar { avatar, figures })
+        Ok(FinishedAvatar { avatar, map, figures })
+    }
+
+    /// What drives the avatar without its field, if that is near enough.
+    fn map_of(&self, avatar: &Arc<Avatar>) -> anyhow::Result<Option<ShapeMap>> {
+        let config = &self.settings.map;
+        let rest = RestBody::of(&self.body, &avatar.subject.betas);
+        let routines = Routine::ACTIONS.iter().chain(&MORE_ROUTINES);
+        let motions: Vec<Motion> = routines
+            .map(|routine| routine.motion(&rest, MAP_RATE_HZ, MAP_SEED))
+            .collect();
+        let mut driver = Driver::new(Arc::clone(avatar), DriveConfig::default());
+        let go_on = &mut || !self.cancel.load(Ordering::Relaxed);
+        let map = ShapeMap::learn(&mut driver, &motions, config, go_on)?;
+        Ok(map.filter(|map| map.error.p95_mm <= config.most_p95_mm))
     }
 
     fn report(&self, now: &FineTuneProgress) -> ControlFlow<()> {

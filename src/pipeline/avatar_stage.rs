@@ -279,10 +279,14 @@ impl AvatarStage {
             self.gave_up = true;
             return Ok(());
         };
-        let FinishedAvatar { avatar, figures } = finished?;
+        let FinishedAvatar { avatar, map, figures } = finished?;
         self.learned_from.extend(&keyframes);
         self.figures.push(figures);
-        let driver = Driver::new(Arc::new(avatar), DriveConfig::default());
+        let driver = Driver::new(avatar, DriveConfig::default());
+        let driver = match map {
+            Some(map) => driver.with_map(map),
+            None => driver,
+        };
         self.made = Some(Made { driver, frames_driven: 0, keyframes });
         Ok(())
     }

@@ -7,6 +7,7 @@ use std::{
 
 use anyhow::{Context as _, ensure};
 use effigy_avatar::{
+    MapConfig,
     canonicalise::CanonicaliseConfig,
     fine_tune::FineTuneConfig,
     hyper::{self, HyperNetwork},
@@ -37,6 +38,8 @@ pub(crate) struct Settings {
     pub(crate) keyframes: KeyframeConfig,
     pub(crate) canonicalise: CanonicaliseConfig,
     pub(crate) fine_tune: FineTuneConfig,
+    /// How an avatar's shape is learned as a function of the pose, so that the drive need not evaluate its field.
+    pub(crate) map: MapConfig,
     pub(crate) schedule: ScheduleConfig,
 }
 

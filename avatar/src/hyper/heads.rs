@@ -91,6 +91,18 @@ impl Head {
         }
     }
 
+    /// What the basis is mixed with; `None` in a full head.
+    ///
+    /// # Shapes
+    /// `code` [rows, 144]; result [rows, rank]
+    pub(crate) fn coefficients(&self, code: &[f32]) -> Option<Vec<f32>> {
+        let first = self.first_norm.forward_relu(&self.first.forward(code));
+        let second = self
+            .second_norm
+            .forward_relu(&self.second.forward(&first.output));
+        Some(self.coefficients.as_ref()?.forward(&second.output))
+    }
+
     /// # Shapes
     /// `code` [rows, 144]; `offsets` a coefficient vector a row, or none at all; result [rows, parameters]
     pub(crate) fn forward(&self, code: &[f32], offsets: &[&[f32]]) -> (HeadCache, Vec<f32>) {

@@ -140,13 +140,12 @@ impl HyperNetwork {
     /// The low-rank coefficients of one pose, layer by layer; empty for full heads. The field's parameters
     /// are linear in them.
     pub fn coefficients(&self, pose: &PoseInput) -> Vec<f32> {
-        let (cache, _) = self.forward(std::slice::from_ref(pose));
-        let low_rank = self
-            .heads
+        let code = self.encoder.forward(std::slice::from_ref(pose)).code;
+        self.heads
             .iter()
-            .zip(cache.heads)
-            .filter(|(h, _)| h.coefficients.is_some());
-        low_rank.flat_map(|(_, cache)| cache.basis_input).collect()
+            .filter_map(|head| head.coefficients(&code))
+            .flatten()
+            .collect()
     }
 
     /// The output layers' inputs for some poses, head by head: what learning rates are derived from.
@@ -333,6 +332,11 @@ impl HyperNetwork {
 impl PoseField for HyperNetwork {
     fn field(&self, pose: &PoseInput) -> Box<dyn SignedDistanceField> {
         Box::new(Self::field(self, pose))
+    }
+
+    fn coefficients(&self, pose: &PoseInput) -> Option<Vec<f32>> {
+        let coefficients = Self::coefficients(self, pose);
+        (!coefficients.is_empty()).then_some(coefficients)
     }
 
     fn kind(&self) -> &str {

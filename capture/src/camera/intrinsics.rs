@@ -16,6 +16,7 @@ pub struct Intrinsics {
 
 impl Intrinsics {
     /// Where a point in camera space falls, without distortion. The caller keeps z positive.
+    #[inline]
     pub fn project(&self, point: Vec3) -> Vec2 {
         vec2(
             self.fx * point.x / point.z + self.cx,
@@ -24,6 +25,7 @@ impl Intrinsics {
     }
 
     /// The point on a pixel's ray at a depth, without distortion.
+    #[inline]
     pub fn unproject(&self, pixel: Vec2, depth_m: f32) -> Vec3 {
         vec3(
             (pixel.x - self.cx) / self.fx * depth_m,

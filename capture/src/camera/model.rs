@@ -24,6 +24,7 @@ pub struct CameraModel {
 
 impl CameraModel {
     /// The pixel on which a point in camera space falls. The caller keeps z positive.
+    #[inline]
     pub fn project(&self, point: Vec3) -> Vec2 {
         let on_plane = match &self.distortion {
             Distortion::None => point.truncate() / point.z,
@@ -35,11 +36,13 @@ impl CameraModel {
     }
 
     /// The point on a pixel's ray at a depth (along z). NaN where the lens has no ray for the pixel.
+    #[inline]
     pub fn unproject(&self, pixel: Vec2, depth_m: f32) -> Vec3 {
         (self.ray(pixel) * depth_m).extend(depth_m)
     }
 
     /// Where a pixel's ray meets the plane z = 1. NaN where the lens has no ray for the pixel.
+    #[inline]
     pub fn ray(&self, pixel: Vec2) -> Vec2 {
         let Intrinsics { fx, fy, cx, cy, .. } = self.intrinsics;
         let on_plane = vec2((pixel.x - cx) / fx, (pixel.y - cy) / fy);

@@ -15,16 +15,19 @@ pub struct Rigid3 {
 impl Rigid3 {
     pub const IDENTITY: Self = Self { rotation: Quat::IDENTITY, translation: Vec3::ZERO };
 
+    #[inline]
     pub fn inverse(self) -> Self {
         let rotation = self.rotation.inverse();
         Self { rotation, translation: -(rotation * self.translation) }
     }
 
     /// Rotates a direction; the translation does not apply.
+    #[inline]
     pub fn rotate(self, direction: Vec3) -> Vec3 {
         self.rotation * direction
     }
 
+    #[inline]
     pub fn rotation_matrix(self) -> Mat3 {
         Mat3::from_quat(self.rotation)
     }
@@ -39,6 +42,7 @@ impl Default for Rigid3 {
 impl Mul<Vec3> for Rigid3 {
     type Output = Vec3;
 
+    #[inline]
     fn mul(self, point: Vec3) -> Vec3 {
         self.rotation * point + self.translation
     }
@@ -47,6 +51,7 @@ impl Mul<Vec3> for Rigid3 {
 impl Mul for Rigid3 {
     type Output = Self;
 
+    #[inline]
     fn mul(self, c_from_a: Self) -> Self {
         Self {
             rotation: (self.rotation * c_from_a.rotation).normalize(),

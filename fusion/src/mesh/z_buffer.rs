@@ -345,7 +345,14 @@ fn project(camera: &Intrinsics, vertex: Vec3) -> Projected {
 
 fn project_unchecked(camera: &Intrinsics, vertex: Vec3) -> Projected {
     let steps = camera.project(vertex) * STEPS as f32;
-    Projected { x: steps.x.round() as i64, y: steps.y.round() as i64, inverse_z: 1.0 / vertex.z }
+    Projected { x: nearest(steps.x), y: nearest(steps.y), inverse_z: 1.0 / vertex.z }
+}
+
+/// The nearest whole number; the library's own is a call on processors without the instruction.
+fn nearest(value: f32) -> i64 {
+    let above = value + 0.5;
+    let toward_zero = above as i64;
+    toward_zero - i64::from(toward_zero as f32 > above)
 }
 
 /// Cuts a triangle to what is in front of the near plane and inside the guard band (Sutherland and Hodgman 1974).

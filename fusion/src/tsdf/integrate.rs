@@ -146,6 +146,7 @@ impl<'a> Projection<'a> {
     }
 
     /// How far in front of the surface at a pixel a place is.
+    #[inline]
     fn distance_m(&self, place: Vec3, pixel: usize) -> Option<f32> {
         let surface = self.view.points.points[pixel];
         if surface.z.is_nan() {
@@ -173,16 +174,19 @@ struct Places {
 }
 
 impl Places {
+    #[inline]
     fn along(start: Vec3, step: Vec3) -> Self {
         let axis = |start: f32, step: f32| std::array::from_fn(|i| start + step * i as f32);
         Self { x: axis(start.x, step.x), y: axis(start.y, step.y), z: axis(start.z, step.z) }
     }
 
+    #[inline]
     fn at(&self, i: usize) -> Vec3 {
         Vec3::new(self.x[i], self.y[i], self.z[i])
     }
 
     /// The numbers of the pixels they fall on.
+    #[inline]
     fn pixels(&self, camera: &CameraModel) -> [u32; BLOCK_SIDE] {
         let Intrinsics { width, height, fx, fy, cx, cy } = camera.intrinsics;
         let (mut x, mut y) = ([0.0; BLOCK_SIDE], [0.0; BLOCK_SIDE]);

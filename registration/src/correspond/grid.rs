@@ -132,7 +132,8 @@ impl OrientedGrid {
     }
 
     fn cell_of(&self, position: Vec3) -> usize {
-        let at = ((position - self.origin) / self.cell_m).floor().as_ivec3();
+        // Towards zero is down: no point lies below the origin.
+        let at = ((position - self.origin) / self.cell_m).as_ivec3();
         self.cell_index(at.clamp(IVec3::ZERO, self.size - 1))
     }
 

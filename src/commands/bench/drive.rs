@@ -5,8 +5,10 @@ use std::sync::{
     atomic::{AtomicUsize, Ordering},
 };
 
+use anyhow::Context as _;
 use effigy_avatar::{
-    Avatar, DriveConfig, Driver, SignedDistanceField, Subject, TopologyConfig, hyper, mesher,
+    Avatar, DriveConfig, Driver, MapConfig, ShapeMap, SignedDistanceField, Subject, TopologyConfig,
+    hyper, mesher,
     skinning::{ClosestBodyPoint, ClosestBodyPointConfig},
 };
 use effigy_capture::FrameId;
@@ -27,38 +29,62 @@ const DENSE_RESOLUTION: usize = 128;
 pub(super) fn rows(quick: bool) -> anyhow::Result<Vec<Row>> {
     let body = builtin::body();
     let subject = Subject::new(&body, &[0.0; 10])?;
-    let motion = Routine::Mixture.motion(&RestBody::of(&body, &subject.betas), 30.0, 1);
+    let rest = RestBody::of(&body, &subject.betas);
     let network = Arc::new(hyper::prior());
     let skinning = ClosestBodyPoint::new(body, &subject.betas, ClosestBodyPointConfig::default());
-    let theta = motion.poses[0].theta;
+    let theta = Routine::Stand.motion(&rest, 30.0, 1).poses[0].theta;
     let topology = TopologyConfig::default();
     let field = Arc::clone(&network);
     let avatar = Arc::new(Avatar::new(&subject, field, &skinning, &theta, &topology)?);
-    let mut rows = poses(&avatar, &motion, if quick { 30 } else { 600 });
+    let mut rows = poses(&avatar, &rest, if quick { 30 } else { 600 })?;
     let sdf = network.field(&subject.pose_input(&theta));
     rows.extend(meshes(&sdf, if quick { 64 } else { RESOLUTION }, quick));
     Ok(rows)
 }
 
-/// The live drive on its own, each pose another one.
-fn poses(avatar: &Arc<Avatar>, motion: &Motion, count: usize) -> Vec<Row> {
-    let mut driver = Driver::new(Arc::clone(avatar), DriveConfig::default());
-    let vertices = avatar.topology.vertices_in_unit.len();
-    let mut number = 0;
-    let [secs] = in_turn(
+/// The live drive on its own, each pose another one: with the map that an avatar gets, and with its full field.
+fn poses(avatar: &Arc<Avatar>, rest: &RestBody, count: usize) -> anyhow::Result<Vec<Row>> {
+    let learned: Vec<Motion> = Routine::ACTIONS
+        .iter()
+        .map(|routine| routine.motion(rest, 15.0, 1))
+        .collect();
+    let new = || Driver::new(Arc::clone(avatar), DriveConfig::default());
+    let mut full = new();
+    let map = ShapeMap::learn(&mut full, &learned, &MapConfig::default(), &mut || true)?
+        .context("the prior has coefficients")?;
+    let error = map.error;
+    let mut mapped = new().with_map(map);
+    let motion = Routine::Mixture.motion(rest, 30.0, 1);
+    let params = |number: usize| {
+        let pose = &motion.poses[number % motion.poses.len()];
+        BodyParams { betas: avatar.subject.betas, theta: pose.theta, trans: pose.trans }
+    };
+    let (mut a, mut b) = (0, 0);
+    let [by_field, by_map] = in_turn(
         count,
-        [&mut || {
-            let pose = &motion.poses[number % motion.poses.len()];
-            let params =
-                BodyParams { betas: avatar.subject.betas, theta: pose.theta, trans: pose.trans };
-            driver.pose(&params, FrameId(number as u64));
-            number += 1;
-        }],
+        [
+            &mut || {
+                full.pose(&params(a), FrameId(0));
+                a += 1;
+            },
+            &mut || {
+                mapped.pose(&params(b), FrameId(0));
+                b += 1;
+            },
+        ],
     );
-    vec![
-        Row::new("drive, live", secs.recip(), "poses/s"),
+    let vertices = avatar.topology.vertices_in_unit.len();
+    Ok(vec![
+        Row::new("drive, full field", by_field.recip(), "poses/s"),
+        Row::new("drive, live", by_map.recip(), "poses/s")
+            .against("the full field's", by_field / by_map),
+        Row::new(
+            "live drive off the full field, p95 in unseen motions",
+            f64::from(error.p95_mm),
+            "mm",
+        ),
         Row::new("vertices driven", vertices as f64, ""),
-    ]
+    ])
 }
 
 /// Following the surface against asking the whole grid.

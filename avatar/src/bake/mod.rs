@@ -4,10 +4,17 @@
 //! motion these offsets vary in few ways: their principal components, found from a part of the motion's poses, are the
 //! modes; each key's weights are its projection on them.
 
-use effigy_registration::BodyParams;
-use effigy_registration::motion::{Motion, MotionPose};
-use faer::{Mat, Side};
+mod map;
+mod principal;
+
+use effigy_registration::{
+    BodyParams,
+    motion::{Motion, MotionPose},
+};
 use serde::{Deserialize, Serialize};
+
+pub use map::{MapConfig, ShapeMap};
+use principal::{principal_components, projected};
 
 use crate::{drive::Driver, error::AvatarError};
 
@@ -44,7 +51,7 @@ pub struct Bake {
     pub error: BakeError,
 }
 
-/// The baked shape against the full field's, measured between keys, where none of it was learned.
+/// A baked shape against the full field's, measured where it was not learned.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct BakeError {
     pub rms_mm: f32,
@@ -120,31 +127,39 @@ impl Bake {
         // Where keys are neighbouring frames nothing lies between them; the keys themselves have to do then.
         let pairs: Vec<(usize, &[usize])> = keys.windows(2).enumerate().collect();
         let every = pairs.len().div_ceil(CHECKED).max(1);
-        let (mut errors, mut still, mut count) = (Vec::new(), 0.0_f64, 0_u64);
-        for &(number, pair) in pairs.iter().skip(every / 2).step_by(every) {
+        let checked = pairs.iter().skip(every / 2).step_by(every);
+        BakeError::of(checked.map(|&(number, pair)| {
             let frame = usize::midpoint(pair[0], pair[1]);
             let share = (frame - pair[0]) as f32 / (pair[1] - pair[0]) as f32;
             let ends = self.weights[number].iter().zip(&self.weights[number + 1]);
             let weights: Vec<f32> = ends.map(|(a, b)| a + share * (b - a)).collect();
-            let full = offsets_at(frame);
-            let baked = self.offsets_m(&weights);
+            (offsets_at(frame), self.offsets_m(&weights), &self.mean_m)
+        }))
+    }
+}
+
+impl BakeError {
+    /// Of poses given as the full offsets, the baked ones and the mean's, metres.
+    fn of<'a>(poses: impl Iterator<Item = (Vec<f32>, Vec<f32>, &'a Vec<f32>)>) -> Self {
+        let (mut errors, mut still) = (Vec::new(), 0.0_f64);
+        for (full, baked, mean) in poses {
             errors.extend(full.iter().zip(&baked).map(|(a, b)| (a - b).abs() * 1e3));
             let strays = full
                 .iter()
-                .zip(&self.mean_m)
+                .zip(mean)
                 .map(|(a, b)| f64::from((a - b) * 1e3).powi(2));
             still += strays.sum::<f64>();
-            count += full.len() as u64;
         }
         if errors.is_empty() {
-            return BakeError::default();
+            return Self::default();
         }
         errors.sort_by(f32::total_cmp);
         let squares: f64 = errors.iter().map(|&error| f64::from(error).powi(2)).sum();
-        BakeError {
-            rms_mm: (squares / count as f64).sqrt() as f32,
+        let count = errors.len() as f64;
+        Self {
+            rms_mm: (squares / count).sqrt() as f32,
             p95_mm: errors[(errors.len() - 1) * 95 / 100],
-            still_rms_mm: (still / count as f64).sqrt() as f32,
+            still_rms_mm: (still / count).sqrt() as f32,
         }
     }
 }
@@ -165,60 +180,6 @@ fn keys(motion: &Motion, keys_per_sec: f32) -> Vec<usize> {
     keys
 }
 
-/// The rows' mean, and the directions in which they vary most, of unit length. The eigenvectors of the rows' Gram
-/// matrix give those of their covariance, which would be thousands a side.
-fn principal_components(
-    rows: &[Vec<f32>],
-    wanted: usize,
-) -> Result<(Vec<f32>, Vec<Vec<f32>>), AvatarError> {
-    /// Of the strongest mode's variance; below it is rounding.
-    const LEAST: f64 = 1e-6;
-    let count = rows.len() as f32;
-    let width = rows[0].len();
-    let mean: Vec<f32> = (0..width)
-        .map(|i| rows.iter().map(|row| row[i]).sum::<f32>() / count)
-        .collect();
-    let centred: Vec<Vec<f32>> = rows
-        .iter()
-        .map(|row| {
-            row.iter()
-                .zip(&mean)
-                .map(|(value, mean)| value - mean)
-                .collect()
-        })
-        .collect();
-    let gram = Mat::from_fn(rows.len(), rows.len(), |i, j| dot(&centred[i], &centred[j]));
-    let eigen = gram
-        .self_adjoint_eigen(Side::Lower)
-        .map_err(|_| AvatarError::Export("baking: the offsets are not finite".to_owned()))?;
-    let strongest = eigen.S()[rows.len() - 1];
-    let modes = (0..rows.len())
-        .rev()
-        .take(wanted)
-        .take_while(|&k| eigen.S()[k] > LEAST * strongest && eigen.S()[k] > f64::MIN_POSITIVE)
-        .map(|k| {
-            let scale = eigen.S()[k].sqrt().recip();
-            let mut mode = vec![0.0_f32; width];
-            for (row, values) in centred.iter().enumerate() {
-                let share = (eigen.U()[(row, k)] * scale) as f32;
-                for (sum, value) in mode.iter_mut().zip(values) {
-                    *sum += share * value;
-                }
-            }
-            mode
-        })
-        .collect();
-    Ok((mean, modes))
-}
-
-fn projected(offsets: &[f32], mean: &[f32], modes: &[Vec<f32>]) -> Vec<f32> {
-    let centred: Vec<f32> = offsets.iter().zip(mean).map(|(a, b)| a - b).collect();
-    modes
-        .iter()
-        .map(|mode| dot(&centred, mode) as f32)
-        .collect()
-}
-
 /// Largest weights become one: what sliders in other programs expect.
 fn normalise(modes: &mut [Vec<f32>], weights: &mut [Vec<f32>]) {
     for (number, mode) in modes.iter_mut().enumerate() {
@@ -231,13 +192,6 @@ fn normalise(modes: &mut [Vec<f32>], weights: &mut [Vec<f32>]) {
             weights.iter_mut().for_each(|row| row[number] /= largest);
         }
     }
-}
-
-fn dot(a: &[f32], b: &[f32]) -> f64 {
-    a.iter()
-        .zip(b)
-        .map(|(&a, &b)| f64::from(a) * f64::from(b))
-        .sum()
 }
 
 #[cfg(test)]
