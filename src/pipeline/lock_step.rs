@@ -11,7 +11,7 @@ use super::{
     outputs::Outputs,
     run_log::{Captured, RunLog},
     settings::Settings,
-    track_stage::TrackStage,
+    track_stage::stages,
 };
 use crate::interrupt;
 
@@ -23,7 +23,8 @@ pub(crate) fn run(
     (avatar, outputs): (&mut AvatarStage, &mut Outputs),
     clock: Clock,
 ) -> anyhow::Result<RunLog> {
-    let mut tracking = TrackStage::new(source.calibration(), Arc::clone(body), settings, clock);
+    let (mut cleaning, mut tracking) =
+        stages(source.calibration(), Arc::clone(body), settings, clock);
     let mut log = RunLog::new(clock);
     let mut captured = Captured::default();
     while !interrupt::requested() {
@@ -32,7 +33,7 @@ pub(crate) fn run(
         };
         log.delivered(&frame);
         captured.count(&frame, false);
-        let tracked = tracking.process(&frame)?;
+        let tracked = tracking.process(cleaning.process(&frame)?);
         let registered = &tracked.registered;
         log.registered(&tracked);
         let decided = avatar.advance(registered)?;

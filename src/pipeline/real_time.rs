@@ -1,4 +1,4 @@
-//! At the source's pace: capture, tracking and driving each on a thread, late frames dropped and counted.
+//! At the source's pace: capture, cleaning, tracking and driving each on a thread, late frames dropped and counted.
 
 use std::{
     collections::VecDeque,
@@ -27,7 +27,7 @@ use super::{
     outputs::Outputs,
     run_log::{Captured, RunLog},
     settings::Settings,
-    track_stage::{TrackStage, TrackedFrame},
+    track_stage::{CleanStage, CleanedFrame, TrackStage, TrackedFrame, stages},
 };
 use crate::interrupt;
 
@@ -46,6 +46,11 @@ struct Delivered {
     playback: Option<PlaybackView>,
 }
 
+struct Cleaned {
+    delivered: Delivered,
+    cleaned: CleanedFrame,
+}
+
 struct Tracked {
     delivered: Delivered,
     tracked: TrackedFrame,
@@ -59,8 +64,10 @@ pub(crate) fn run(
     (avatar, outputs): (&mut AvatarStage, &mut Outputs),
     (clock, controls): (Clock, &Controls),
 ) -> anyhow::Result<RunLog> {
-    let tracking = TrackStage::new(source.calibration(), Arc::clone(body), settings, clock);
-    let (to_track, frames) = bounded(QUEUE);
+    let (cleaning, tracking) = stages(source.calibration(), Arc::clone(body), settings, clock);
+    let (to_clean, frames) = bounded(QUEUE);
+    // Handed over directly: a cleaned frame that waited would only be late.
+    let (to_track, cleaned) = bounded(0);
     let (to_drive, tracked) = bounded(QUEUE);
     let stale_frames = frames.clone();
     let stop = AtomicBool::new(false);
@@ -72,23 +79,31 @@ pub(crate) fn run(
             .spawn_scoped(scope, move || {
                 capture(
                     &mut *source,
-                    &to_track,
+                    &to_clean,
                     &stale_frames,
                     (clock, controls, stop),
                 )
             })
             .context("cannot start the capture thread")?;
+        let clean = thread::Builder::new()
+            .name("clean".to_owned())
+            .spawn_scoped(scope, move || {
+                let _stops = StopsCapture(stop);
+                clean(cleaning, &frames, &to_track)
+            })
+            .context("cannot start the cleaning thread")?;
         let track = thread::Builder::new()
             .name("track".to_owned())
             .spawn_scoped(scope, move || {
                 let _stops = StopsCapture(stop);
-                track(tracking, &frames, &to_drive)
+                track(tracking, &cleaned, &to_drive);
             })
             .context("cannot start the tracking thread")?;
         let driven = drive(&tracked, avatar, outputs, (&mut log, controls));
         // Closes the queue, so that the threads before it end too.
         drop(tracked);
-        joined(track)?;
+        track.join().unwrap_or_else(|panic| resume_unwind(panic));
+        joined(clean)?;
         let captured = joined(capture)?;
         driven?;
         log.captured(&captured);
@@ -99,7 +114,7 @@ pub(crate) fn run(
     Ok(log)
 }
 
-/// When tracking ends, in whatever way, nothing more need be captured.
+/// When cleaning or tracking ends, in whatever way, nothing more need be captured.
 struct StopsCapture<'a>(&'a AtomicBool);
 
 impl Drop for StopsCapture<'_> {
@@ -116,7 +131,7 @@ fn joined<T>(thread: ScopedJoinHandle<'_, anyhow::Result<T>>) -> anyhow::Result<
 /// Delivers frames when their time has come; a frame that nobody took makes way for the next.
 fn capture(
     source: &mut dyn FrameSource,
-    to_track: &Sender<Delivered>,
+    to_clean: &Sender<Delivered>,
     waiting: &Receiver<Delivered>,
     (clock, controls, stop): (Clock, &Controls, &AtomicBool),
 ) -> anyhow::Result<Captured> {
@@ -148,7 +163,7 @@ fn capture(
             playback: controls.playback(source.player()),
         };
         loop {
-            match to_track.try_send(item) {
+            match to_clean.try_send(item) {
                 Ok(()) => break,
                 Err(TrySendError::Full(back)) => {
                     item = back;
@@ -172,21 +187,30 @@ fn wait_until_due(pacer: &mut Pacer, frame: Timestamp, clock: Clock) -> Duration
     clock.now()
 }
 
-fn track(
-    mut tracking: TrackStage,
+fn clean(
+    mut cleaning: CleanStage,
     frames: &Receiver<Delivered>,
-    to_drive: &Sender<Tracked>,
+    to_track: &Sender<Cleaned>,
 ) -> anyhow::Result<()> {
     for delivered in frames {
-        if delivered.jumped {
-            tracking.jumped();
-        }
-        let tracked = tracking.process(&delivered.frame)?;
-        if to_drive.send(Tracked { delivered, tracked }).is_err() {
+        let cleaned = cleaning.process(&delivered.frame)?;
+        if to_track.send(Cleaned { delivered, cleaned }).is_err() {
             break;
         }
     }
     Ok(())
+}
+
+fn track(mut tracking: TrackStage, frames: &Receiver<Cleaned>, to_drive: &Sender<Tracked>) {
+    for Cleaned { delivered, cleaned } in frames {
+        if delivered.jumped {
+            tracking.jumped();
+        }
+        let tracked = tracking.process(cleaned);
+        if to_drive.send(Tracked { delivered, tracked }).is_err() {
+            break;
+        }
+    }
 }
 
 /// How many frames were dropped by when.

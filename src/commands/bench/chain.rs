@@ -12,7 +12,7 @@ use crate::{
 };
 
 /// Long enough for a turn, an avatar made beside it, and some seconds of driving it afterwards.
-const SECONDS: f32 = 45.0;
+const SECONDS: f32 = 75.0;
 const QUICK_SECONDS: f32 = 1.0;
 
 pub(super) fn rows(quick: bool) -> anyhow::Result<Vec<Row>> {

@@ -9,8 +9,8 @@ use crate::maps::{DepthMap, Rays};
 /// Pixels along a side of a cell.
 pub(super) const CELL_PX: usize = 2;
 
-/// Pixels closer than this are one surface for any sensor.
-const ALIKE_M: f32 = 0.002;
+/// Pixels of a surface that falls away by this, in metres a metre, beside the noise, are one surface.
+const FRONT_SLOPE: f32 = 2.0;
 
 /// One point for each cell; NaN where nothing was measured.
 #[derive(Clone, Debug)]
@@ -51,9 +51,11 @@ impl Coarse {
                 let above = &depth.metres[CELL_PX * y * depth.width..][..depth.width];
                 let below = &depth.metres[(CELL_PX * y + 1) * depth.width..][..depth.width];
                 let pairs = || above.chunks_exact(CELL_PX).zip(below.chunks_exact(CELL_PX));
-                // Most cells see one surface: first all of them as if they did, several at a time.
+                // Most cells see one surface, even if nothing is allowed for noise: first all of them as if they
+                // did, several at a time.
+                let alike = FRONT_SLOPE * tolerance.pixel_size_m(1.0);
                 for ((point, ray), (above, below)) in points.iter_mut().zip(rays).zip(pairs()) {
-                    *point = *ray * alike_depth([above[0], above[1], below[0], below[1]]);
+                    *point = *ray * alike_depth([above[0], above[1], below[0], below[1]], alike);
                 }
                 for ((point, ray), (above, below)) in points.iter_mut().zip(rays).zip(pairs()) {
                     if point.z.is_nan() {
@@ -70,15 +72,20 @@ impl Coarse {
     }
 }
 
-/// The mean of four pixels that are alike; NaN if they are not, or one is missing.
+/// The mean of four pixels that differ by less than this share of their depth; NaN if they do not, or one is missing.
 #[inline]
-fn alike_depth([a, b, c, d]: [f32; 4]) -> f32 {
+fn alike_depth([a, b, c, d]: [f32; 4], share: f32) -> f32 {
     // Written without regard to NaN, which the mean brings back in.
     let larger = |a: f32, b: f32| if a > b { a } else { b };
     let smaller = |a: f32, b: f32| if a < b { a } else { b };
-    let spread = larger(larger(a, b), larger(c, d)) - smaller(smaller(a, b), smaller(c, d));
+    let nearest = smaller(smaller(a, b), smaller(c, d));
+    let spread = larger(larger(a, b), larger(c, d)) - nearest;
     let mean = 0.25 * (a + b + c + d);
-    if spread < ALIKE_M { mean } else { f32::NAN }
+    if spread < share * nearest {
+        mean
+    } else {
+        f32::NAN
+    }
 }
 
 /// The mean of the pixels near the nearest one.
@@ -89,7 +96,7 @@ fn front_depth(pixels: [f32; 4], tolerance: &Tolerance) -> f32 {
     if nearest.is_nan() {
         return f32::NAN;
     }
-    let limit_m = nearest + tolerance.step_m(nearest, 1.0, 2.0, 3.0);
+    let limit_m = nearest + tolerance.step_m(nearest, 1.0, FRONT_SLOPE, 3.0);
     let (mut sum, mut count) = (0.0, 0.0);
     for depth in pixels {
         if depth <= limit_m {
