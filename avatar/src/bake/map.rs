@@ -131,7 +131,7 @@ impl ShapeMap {
         }
         let cholesky = products
             .llt(Side::Lower)
-            .map_err(|_| AvatarError::Export("baking: coefficients are not finite".to_owned()))?;
+            .map_err(|error| AvatarError::Export(format!("baking: coefficients: {error:?}")))?;
         let solved = cholesky.solve(&(centred.transpose() * &wanted));
         let inverse = cholesky.solve(&Mat::<f64>::identity(inputs, inputs));
         let weights = (0..modes_m.len())

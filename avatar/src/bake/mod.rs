@@ -53,6 +53,7 @@ pub struct Bake {
 
 /// A baked shape against the full field's, measured where it was not learned.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[expect(clippy::struct_field_names, reason = "they say their unit")]
 pub struct BakeError {
     pub rms_mm: f32,
     pub p95_mm: f32,
@@ -188,8 +189,12 @@ fn normalise(modes: &mut [Vec<f32>], weights: &mut [Vec<f32>]) {
             .map(|row| row[number].abs())
             .fold(0.0, f32::max);
         if largest > 0.0 {
-            mode.iter_mut().for_each(|value| *value *= largest);
-            weights.iter_mut().for_each(|row| row[number] /= largest);
+            for value in mode.iter_mut() {
+                *value *= largest;
+            }
+            for row in weights.iter_mut() {
+                row[number] /= largest;
+            }
         }
     }
 }

@@ -29,7 +29,7 @@ pub(super) fn principal_components(
     let gram = Mat::from_fn(rows.len(), rows.len(), |i, j| dot(&centred[i], &centred[j]));
     let eigen = gram
         .self_adjoint_eigen(Side::Lower)
-        .map_err(|_| AvatarError::Export("baking: the offsets are not finite".to_owned()))?;
+        .map_err(|error| AvatarError::Export(format!("baking: offsets: {error:?}")))?;
     let strongest = eigen.S()[rows.len() - 1];
     let modes = (0..rows.len())
         .rev()

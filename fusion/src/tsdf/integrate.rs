@@ -204,11 +204,8 @@ impl Places {
         let (right, bottom) = (width as f32, height as f32);
         std::array::from_fn(|i| {
             // Truncation rounds down what is not negative.
-            let inside = (self.z[i] > 0.0)
-                & (x[i] >= 0.0)
-                & (y[i] >= 0.0)
-                & (x[i] < right)
-                & (y[i] < bottom);
+            let inside =
+                self.z[i] > 0.0 && x[i] >= 0.0 && y[i] >= 0.0 && x[i] < right && y[i] < bottom;
             if inside {
                 (y[i] as i32 as u32) * width + (x[i] as i32 as u32)
             } else {
