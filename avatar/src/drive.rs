@@ -12,6 +12,7 @@ use crate::{
     bake::ShapeMap,
     mesher::{self, FieldAt},
     model::Avatar,
+    pose_input::PoseInput,
     sdf::SignedDistanceField,
     skinning::{Skinning, Warp},
 };
@@ -159,8 +160,8 @@ impl Driver {
 
     /// The avatar in the pose of `params`; the shape is the avatar's own, whatever `params.betas` say.
     pub fn pose(&mut self, params: &BodyParams, frame: FrameId) -> AvatarMesh {
-        if !self.place_by_map(&params.theta) {
-            let pose = self.avatar.subject.pose_input(&params.theta);
+        let pose = self.avatar.subject.pose_input(&params.theta);
+        if !self.place_by_map(&pose) {
             let sdf = self.avatar.field.field(&pose);
             self.project(&*sdf);
         }
@@ -177,52 +178,37 @@ impl Driver {
         AvatarMesh { frame, theta: params.theta, canonical, vertices, normals, triangles }
     }
 
-    /// The pose's coefficients, if the field has such.
-    pub(crate) fn coefficients(&self, theta: &[Vec3; JOINT_COUNT]) -> Option<Vec<f32>> {
-        self.avatar
-            .field
-            .coefficients(&self.avatar.subject.pose_input(theta))
-    }
-
     /// Leaves the vertices in `self.points`, if there is a map and it knows the pose.
-    fn place_by_map(&mut self, theta: &[Vec3; JOINT_COUNT]) -> bool {
-        let Some(coefficients) = self.map.as_ref().and_then(|_| self.coefficients(theta)) else {
+    fn place_by_map(&mut self, pose: &PoseInput) -> bool {
+        let Some(map) = &self.map else {
             return false;
         };
-        let known = self
-            .map
-            .as_ref()
-            .is_some_and(|map| map.offsets_m(&coefficients, &mut self.offsets));
-        if known {
-            let topology = &self.avatar.topology;
-            let units_per_metre = self.avatar.subject.unit_box.metres_per_unit().recip();
-            let longest_m = self.config.max_offset_m;
-            let places = topology.vertices_in_unit.iter().zip(&topology.normals);
-            self.points.clear();
-            self.points.extend(
-                places
-                    .zip(&self.offsets)
-                    .map(|((&vertex, &normal), offset_m)| {
-                        vertex + normal * (offset_m.clamp(-longest_m, longest_m) * units_per_metre)
-                    }),
-            );
+        let coefficients = self.avatar.field.coefficients(pose);
+        if !coefficients.is_some_and(|known| map.offsets_m(&known, &mut self.offsets)) {
+            return false;
         }
-        known
+        let topology = &self.avatar.topology;
+        let units_per_metre = self.avatar.subject.unit_box.metres_per_unit().recip();
+        let longest_m = self.config.max_offset_m;
+        let places = topology.vertices_in_unit.iter().zip(&topology.normals);
+        let offset = |((&vertex, &normal), offset_m): ((&Vec3, &Vec3), &f32)| {
+            vertex + normal * (offset_m.clamp(-longest_m, longest_m) * units_per_metre)
+        };
+        self.points.clear();
+        self.points.extend(places.zip(&self.offsets).map(offset));
+        true
     }
 
-    /// How far each vertex lies along its topology normal from its topology place in the pose of `params`, metres;
-    /// found along normals, whatever the configuration says.
-    pub fn offsets_m(&mut self, params: &BodyParams) -> &[f32] {
-        let subject = &self.avatar.subject;
-        let metres_per_unit = subject.unit_box.metres_per_unit();
-        let sdf = self.avatar.field.field(&subject.pose_input(&params.theta));
-        let longest = self.config.max_offset_m / metres_per_unit;
-        self.points
-            .clone_from(&self.avatar.topology.vertices_in_unit);
+    /// How far each vertex lies along its topology normal from its topology place in a pose, metres; found in the full
+    /// field and along normals, whatever the configuration says.
+    pub fn offsets_m(&mut self, pose: &PoseInput) -> &[f32] {
+        let sdf = self.avatar.field.field(pose);
         let steps = match self.config.projection {
             Projection::AlongNormals { steps } | Projection::AlongGradients { steps } => steps,
         };
+        let longest = self.start_from_topology();
         self.project_along_normals(&*sdf, steps, longest);
+        let metres_per_unit = self.avatar.subject.unit_box.metres_per_unit();
         for offset in &mut self.offsets {
             *offset *= metres_per_unit;
         }
@@ -231,9 +217,7 @@ impl Driver {
 
     /// Moves the topology's vertices onto the zero level of this field; the result is in `self.points`.
     fn project(&mut self, sdf: &dyn SignedDistanceField) {
-        let longest = self.config.max_offset_m / self.avatar.subject.unit_box.metres_per_unit();
-        self.points
-            .clone_from(&self.avatar.topology.vertices_in_unit);
+        let longest = self.start_from_topology();
         match self.config.projection {
             Projection::AlongNormals { steps } => self.project_along_normals(sdf, steps, longest),
             Projection::AlongGradients { steps } => {
@@ -243,6 +227,13 @@ impl Driver {
                 }
             }
         }
+    }
+
+    /// Puts the vertices to their topology places; how far they may go from there, in unit lengths.
+    fn start_from_topology(&mut self) -> f32 {
+        self.points
+            .clone_from(&self.avatar.topology.vertices_in_unit);
+        self.config.max_offset_m / self.avatar.subject.unit_box.metres_per_unit()
     }
 
     fn project_along_normals(&mut self, sdf: &dyn SignedDistanceField, steps: usize, longest: f32) {

@@ -27,8 +27,7 @@ pub trait PoseField: Send + Sync + Any {
     fn field(&self, pose: &PoseInput) -> Box<dyn SignedDistanceField>;
 
     /// The few numbers through which alone the pose enters the field's parameters, if there are such.
-    fn coefficients(&self, pose: &PoseInput) -> Option<Vec<f32>> {
-        let _ = pose;
+    fn coefficients(&self, _pose: &PoseInput) -> Option<Vec<f32>> {
         None
     }
 

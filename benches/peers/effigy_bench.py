@@ -6,6 +6,7 @@ import pathlib
 import statistics
 import subprocess
 import tempfile
+import time
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 
@@ -25,6 +26,21 @@ def bench(effigy, part, *more):
         subprocess.run(command, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         rows = json.loads(report.read_text())["rows"]
     return {row["name"]: row["value"] for row in rows if row["unit"] == "ms"}
+
+
+def timed(step, count):
+    """A function that takes the median milliseconds of so many calls, after one that warms up."""
+
+    def milliseconds():
+        step()
+        seconds = []
+        for _ in range(count):
+            start = time.perf_counter()
+            step()
+            seconds.append(time.perf_counter() - start)
+        return 1e3 * statistics.median(seconds)
+
+    return milliseconds
 
 
 def compare(rounds, ours, peers):

@@ -2,13 +2,10 @@
 gradients and Adam. "double backward" is how the paper's code does it; "by hand" writes the field's gradient as a sweep
 of its own, which needs first-order autograd only."""
 
-import statistics
-import time
-
 import torch
 from torch import nn
 
-from effigy_bench import arguments, bench, compare
+from effigy_bench import arguments, bench, compare, timed
 
 FRAMES, POINTS, OMEGA = 8, 1500, 30.0
 CODE, WIDTH = 144, 256
@@ -96,19 +93,6 @@ class Step:
         self.adam.zero_grad(set_to_none=True)
         loss.backward()
         self.adam.step()
-
-
-def timed(step, count):
-    def milliseconds():
-        step()
-        seconds = []
-        for _ in range(count):
-            start = time.perf_counter()
-            step()
-            seconds.append(time.perf_counter() - start)
-        return 1e3 * statistics.median(seconds)
-
-    return milliseconds
 
 
 def main():

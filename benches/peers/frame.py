@@ -3,28 +3,13 @@ linear blend skinning in numpy; on what `effigy bench --keep` worked on."""
 
 import json
 import pathlib
-import statistics
 import tempfile
-import time
 
 import numpy as np
 import open3d as o3d
 from skimage.measure import marching_cubes
 
-from effigy_bench import arguments, bench, compare
-
-
-def timed(call, count=15):
-    def milliseconds():
-        call()
-        seconds = []
-        for _ in range(count):
-            start = time.perf_counter()
-            call()
-            seconds.append(time.perf_counter() - start)
-        return 1e3 * statistics.median(seconds)
-
-    return milliseconds
+from effigy_bench import arguments, bench, compare, timed
 
 
 def volume(inputs, depth):
@@ -95,6 +80,10 @@ def skinning(inputs):
     return step
 
 
+# Calls of each package in its turn.
+CALLS = 15
+
+
 def main():
     options = arguments(__doc__).parse_args()
     with tempfile.TemporaryDirectory() as name:
@@ -107,11 +96,11 @@ def main():
     print(f"Open3D {o3d.__version__}, numpy {np.__version__}\n")
     integrate = "integrate a person into a volume"
     peers = [
-        ("Open3D ScalableTSDFVolume", integrate, timed(volume(inputs, depth))),
-        ("Open3D VoxelBlockGrid", integrate, timed(block_grid(inputs, depth))),
-        ("Open3D normal map", "normals of a map, 640x576", timed(normals(inputs, depth))),
-        ("scikit-image", f"marching cubes, {side}^3", timed(lambda: marching_cubes(grid, 0.0))),
-        ("numpy, skinning alone", "pose the body", timed(skinning(inputs))),
+        ("Open3D ScalableTSDFVolume", integrate, timed(volume(inputs, depth), CALLS)),
+        ("Open3D VoxelBlockGrid", integrate, timed(block_grid(inputs, depth), CALLS)),
+        ("Open3D normal map", "normals of a map, 640x576", timed(normals(inputs, depth), CALLS)),
+        ("scikit-image", f"marching cubes, {side}^3", timed(lambda: marching_cubes(grid, 0.0), CALLS)),
+        ("numpy, skinning alone", "pose the body", timed(skinning(inputs), CALLS)),
     ]
     compare(options.rounds, lambda: bench(options.effigy, "fusion"), peers)
 

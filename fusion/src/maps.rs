@@ -224,12 +224,16 @@ fn rough_normals(vertices: &VertexMap, first: usize, y: usize, normals: &mut [Ve
                 center
             }
         };
-        let left = on_surface(here[x.saturating_sub(REACH_PX)]);
-        let right = on_surface(here[(x + REACH_PX).min(width - 1)]);
-        let (left, right) = (
-            if x >= REACH_PX { left } else { center },
-            if x + REACH_PX < width { right } else { center },
-        );
+        let left = if x >= REACH_PX {
+            on_surface(here[x - REACH_PX])
+        } else {
+            center
+        };
+        let right = if x + REACH_PX < width {
+            on_surface(here[x + REACH_PX])
+        } else {
+            center
+        };
         // Right cross down points away from the camera.
         let vector = (on_surface(below[x]) - on_surface(above[x])).cross(right - left);
         let vector = if center.z.is_nan() {

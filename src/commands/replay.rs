@@ -57,7 +57,7 @@ pub(crate) fn open(args: &ReplayArgs) -> anyhow::Result<Input> {
         .transpose();
     let smoothed = smoothed.with_context(|| {
         format!(
-            "{}: how it was smoothed cannot be read ({SMOOTH_KEY})",
+            "{}: `{SMOOTH_KEY}` in its metadata does not say how it was smoothed; record it again",
             args.input.display()
         )
     })?;

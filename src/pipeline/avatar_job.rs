@@ -48,8 +48,16 @@ const MORE_ROUTINES: [Routine; 4] = [
     Routine::WalkInPlace,
     Routine::Wave,
 ];
-const MAP_RATE_HZ: f32 = 15.0;
-const MAP_SEED: u64 = 1;
+
+/// What a map of somebody's avatar learns from.
+pub(crate) fn map_motions(rest: &RestBody) -> Vec<Motion> {
+    const RATE_HZ: f32 = 15.0;
+    const SEED: u64 = 1;
+    let routines = Routine::ACTIONS.iter().chain(&MORE_ROUTINES);
+    routines
+        .map(|routine| routine.motion(rest, RATE_HZ, SEED))
+        .collect()
+}
 
 /// A running job; dropping it cancels it.
 pub(crate) struct AvatarJob {
@@ -60,9 +68,7 @@ pub(crate) struct AvatarJob {
 }
 
 pub(crate) struct FinishedAvatar {
-    pub(crate) avatar: Arc<Avatar>,
-    /// Drives it without its field.
-    pub(crate) map: Option<ShapeMap>,
+    pub(crate) driver: Driver,
     pub(crate) figures: JobFigures,
 }
 
@@ -244,8 +250,8 @@ impl Work {
             &middle.theta,
             &TopologyConfig::default(),
         )?;
-        let avatar = Arc::new(avatar);
-        let map = self.map_of(&avatar)?;
+        let mut driver = Driver::new(Arc::new(avatar), DriveConfig::default());
+        let map = self.map_of(&mut driver)?;
         let figures = JobFigures {
             steps: last.step as usize,
             loss: last.loss.total() as f32,
@@ -254,20 +260,19 @@ impl Work {
             map_p95_mm: map.as_ref().map(|map| map.error.p95_mm),
             total_secs: self.clock.secs() - started,
         };
-        Ok(FinishedAvatar { avatar, map, figures })
+        let driver = match map {
+            Some(map) => driver.with_map(map),
+            None => driver,
+        };
+        Ok(FinishedAvatar { driver, figures })
     }
 
     /// What drives the avatar without its field, if that is near enough.
-    fn map_of(&self, avatar: &Arc<Avatar>) -> anyhow::Result<Option<ShapeMap>> {
+    fn map_of(&self, driver: &mut Driver) -> anyhow::Result<Option<ShapeMap>> {
         let config = &self.settings.map;
-        let rest = RestBody::of(&self.body, &avatar.subject.betas);
-        let routines = Routine::ACTIONS.iter().chain(&MORE_ROUTINES);
-        let motions: Vec<Motion> = routines
-            .map(|routine| routine.motion(&rest, MAP_RATE_HZ, MAP_SEED))
-            .collect();
-        let mut driver = Driver::new(Arc::clone(avatar), DriveConfig::default());
+        let motions = map_motions(&RestBody::of(&self.body, &driver.avatar().subject.betas));
         let go_on = &mut || !self.cancel.load(Ordering::Relaxed);
-        let map = ShapeMap::learn(&mut driver, &motions, config, go_on)?;
+        let map = ShapeMap::learn(driver, &motions, config, go_on)?;
         Ok(map.filter(|map| map.error.p95_mm <= config.most_p95_mm))
     }
 

@@ -2,9 +2,7 @@
 
 use std::{collections::BTreeSet, sync::Arc};
 
-use effigy_avatar::{
-    Avatar, AvatarMesh, DriveConfig, Driver, KeyframeSelector, fine_tune::FineTuneProgress,
-};
+use effigy_avatar::{Avatar, AvatarMesh, Driver, KeyframeSelector, fine_tune::FineTuneProgress};
 use effigy_capture::{CameraModel, FrameId};
 use effigy_registration::{BodyModel, RegisteredFrame, SmoothConfig, Smoother};
 
@@ -279,14 +277,9 @@ impl AvatarStage {
             self.gave_up = true;
             return Ok(());
         };
-        let FinishedAvatar { avatar, map, figures } = finished?;
+        let FinishedAvatar { driver, figures } = finished?;
         self.learned_from.extend(&keyframes);
         self.figures.push(figures);
-        let driver = Driver::new(avatar, DriveConfig::default());
-        let driver = match map {
-            Some(map) => driver.with_map(map),
-            None => driver,
-        };
         self.made = Some(Made { driver, frames_driven: 0, keyframes });
         Ok(())
     }

@@ -9,8 +9,8 @@ use faer::{Mat, Side, linalg::solvers::Solve as _};
 use serde::{Deserialize, Serialize};
 
 use super::{
-    BakeError, params,
-    principal::{dot, principal_components, projected},
+    BakeError,
+    principal::{dot, mix_into, principal_components, projected},
 };
 use crate::{drive::Driver, error::AvatarError};
 
@@ -81,11 +81,12 @@ impl ShapeMap {
                 if !go_on() {
                     return Ok(None);
                 }
-                let pose = &motion.poses[index * (motion.poses.len() - 1) / count.max(1)];
-                let Some(coefficients) = driver.coefficients(&pose.theta) else {
+                let theta = &motion.poses[index * (motion.poses.len() - 1) / count.max(1)].theta;
+                let pose = driver.avatar().subject.pose_input(theta);
+                let Some(coefficients) = driver.avatar().field.coefficients(&pose) else {
                     return Ok(None);
                 };
-                let offsets_m = driver.offsets_m(&params(pose)).to_vec();
+                let offsets_m = driver.offsets_m(&pose).to_vec();
                 samples.push(Sample { motion: number, coefficients, offsets_m });
             }
         }
@@ -168,13 +169,8 @@ impl ShapeMap {
     }
 
     fn write(&self, centred: &[f32], offsets_m: &mut Vec<f32>) {
-        offsets_m.clone_from(&self.mean_m);
-        for (weights, mode) in self.weights.iter().zip(&self.modes_m) {
-            let weight = dot(weights, centred) as f32;
-            for (offset, shape) in offsets_m.iter_mut().zip(mode) {
-                *offset += weight * shape;
-            }
-        }
+        let weights = self.weights.iter().map(|row| dot(row, centred) as f32);
+        mix_into(offsets_m, &self.mean_m, &self.modes_m, weights);
     }
 
     fn centred(&self, coefficients: &[f32]) -> Vec<f32> {
@@ -208,7 +204,8 @@ mod tests {
 
     use effigy_capture::FrameId;
     use effigy_registration::{
-        motion::{RestBody, Routine},
+        BodyParams,
+        motion::{MotionPose, RestBody, Routine},
         smpl::builtin,
     };
 
@@ -219,6 +216,10 @@ mod tests {
         model::{Avatar, Subject, TopologyConfig},
         skinning::{ClosestBodyPoint, ClosestBodyPointConfig},
     };
+
+    fn params(pose: &MotionPose) -> BodyParams {
+        BodyParams { betas: [0.0; 10], theta: pose.theta, trans: pose.trans }
+    }
 
     fn motions(routines: &[Routine], seed: u64) -> Vec<Motion> {
         let rest = RestBody::of(&builtin::body(), &[0.0; 10]);
@@ -259,7 +260,7 @@ mod tests {
         assert!(map.error.p95_mm < 1.0 && map.error.p95_mm < map.error.still_rms_mm);
 
         let mut mapped = Driver::new(avatar, DriveConfig::default()).with_map(map);
-        let (mut errors_mm, mut far) = (Vec::new(), 0);
+        let mut errors_mm = Vec::new();
         for pose in &motions(&[Routine::Bend], 5)[0].poses {
             let params = params(pose);
             let (a, b) = (
@@ -285,7 +286,6 @@ mod tests {
             full.pose(&params, FrameId(0)),
             mapped.pose(&params, FrameId(0)),
         );
-        far += usize::from(a.vertices == b.vertices);
-        assert_eq!(far, 1);
+        assert_eq!(a.vertices, b.vertices);
     }
 }

@@ -7,14 +7,11 @@
 mod map;
 mod principal;
 
-use effigy_registration::{
-    BodyParams,
-    motion::{Motion, MotionPose},
-};
+use effigy_registration::motion::Motion;
 use serde::{Deserialize, Serialize};
 
 pub use map::{MapConfig, ShapeMap};
-use principal::{principal_components, projected};
+use principal::{mix_into, principal_components, projected};
 
 use crate::{drive::Driver, error::AvatarError};
 
@@ -81,7 +78,11 @@ impl Bake {
             return Err(broken("keys_per_sec and learned_from must be above zero"));
         }
         let keys = keys(motion, config.keys_per_sec);
-        let mut offsets_at = |pose: usize| driver.offsets_m(&params(&motion.poses[pose])).to_vec();
+        let subject = driver.avatar().subject;
+        let mut offsets_at = |pose: usize| {
+            let pose = subject.pose_input(&motion.poses[pose].theta);
+            driver.offsets_m(&pose).to_vec()
+        };
         let learned_every = keys.len().div_ceil(config.learned_from).max(1);
         let mut learned = Vec::new();
         for &key in keys.iter().step_by(learned_every) {
@@ -115,12 +116,13 @@ impl Bake {
 
     /// Offsets along the topology normals with these weights, metres.
     pub fn offsets_m(&self, weights: &[f32]) -> Vec<f32> {
-        let mut offsets = self.mean_m.clone();
-        for (mode, &weight) in self.modes_m.iter().zip(weights) {
-            for (offset, &shape) in offsets.iter_mut().zip(mode) {
-                *offset += weight * shape;
-            }
-        }
+        let mut offsets = Vec::new();
+        mix_into(
+            &mut offsets,
+            &self.mean_m,
+            &self.modes_m,
+            weights.iter().copied(),
+        );
         offsets
     }
 
@@ -165,10 +167,6 @@ impl BakeError {
     }
 }
 
-fn params(pose: &MotionPose) -> BodyParams {
-    BodyParams { betas: [0.0; 10], theta: pose.theta, trans: pose.trans }
-}
-
 /// Frames of the motion: evenly spread, the first and the last among them.
 fn keys(motion: &Motion, keys_per_sec: f32) -> Vec<usize> {
     let last = motion.poses.len() - 1;
@@ -202,6 +200,8 @@ fn normalise(modes: &mut [Vec<f32>], weights: &mut [Vec<f32>]) {
 #[cfg(test)]
 mod tests {
     use std::sync::Arc;
+
+    use effigy_registration::motion::MotionPose;
 
     use super::*;
     use crate::{

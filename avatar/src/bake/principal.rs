@@ -50,6 +50,22 @@ pub(super) fn principal_components(
     Ok((mean, modes))
 }
 
+/// Writes the mean with so much of each mode.
+pub(super) fn mix_into(
+    row: &mut Vec<f32>,
+    mean: &[f32],
+    modes: &[Vec<f32>],
+    weights: impl Iterator<Item = f32>,
+) {
+    row.clear();
+    row.extend(mean);
+    for (mode, weight) in modes.iter().zip(weights) {
+        for (value, shape) in row.iter_mut().zip(mode) {
+            *value += weight * shape;
+        }
+    }
+}
+
 /// How much of each mode a row has.
 pub(super) fn projected(offsets: &[f32], mean: &[f32], modes: &[Vec<f32>]) -> Vec<f32> {
     let centred: Vec<f32> = offsets.iter().zip(mean).map(|(a, b)| a - b).collect();

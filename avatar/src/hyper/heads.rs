@@ -96,20 +96,23 @@ impl Head {
     /// # Shapes
     /// `code` [rows, 144]; result [rows, rank]
     pub(crate) fn coefficients(&self, code: &[f32]) -> Option<Vec<f32>> {
+        let [_, second] = self.trunk(code);
+        Some(self.coefficients.as_ref()?.forward(&second.output))
+    }
+
+    /// Both hidden layers.
+    fn trunk(&self, code: &[f32]) -> [NormCache; 2] {
         let first = self.first_norm.forward_relu(&self.first.forward(code));
         let second = self
             .second_norm
             .forward_relu(&self.second.forward(&first.output));
-        Some(self.coefficients.as_ref()?.forward(&second.output))
+        [first, second]
     }
 
     /// # Shapes
     /// `code` [rows, 144]; `offsets` a coefficient vector a row, or none at all; result [rows, parameters]
     pub(crate) fn forward(&self, code: &[f32], offsets: &[&[f32]]) -> (HeadCache, Vec<f32>) {
-        let first = self.first_norm.forward_relu(&self.first.forward(code));
-        let second = self
-            .second_norm
-            .forward_relu(&self.second.forward(&first.output));
+        let [first, second] = self.trunk(code);
         let basis_input = match &self.coefficients {
             Some(layer) => {
                 let mut coefficients = layer.forward(&second.output);

@@ -15,12 +15,13 @@ use effigy_capture::FrameId;
 use effigy_fusion::mesh::marching_cubes::marching_cubes;
 use effigy_registration::{
     BodyParams,
-    motion::{Motion, RestBody, Routine},
+    motion::{RestBody, Routine},
     smpl::builtin,
 };
 use glam::Vec3;
 
 use super::{Row, in_turn::in_turn};
+use crate::pipeline::avatar_job::map_motions;
 
 /// MetaAvatar's grid, and one that a dense evaluation can afford here.
 const RESOLUTION: usize = 256;
@@ -44,14 +45,15 @@ pub(super) fn rows(quick: bool) -> anyhow::Result<Vec<Row>> {
 
 /// The live drive on its own, each pose another one: with the map that an avatar gets, and with its full field.
 fn poses(avatar: &Arc<Avatar>, rest: &RestBody, count: usize) -> anyhow::Result<Vec<Row>> {
-    let learned: Vec<Motion> = Routine::ACTIONS
-        .iter()
-        .map(|routine| routine.motion(rest, 15.0, 1))
-        .collect();
     let new = || Driver::new(Arc::clone(avatar), DriveConfig::default());
     let mut full = new();
-    let map = ShapeMap::learn(&mut full, &learned, &MapConfig::default(), &mut || true)?
-        .context("the prior has coefficients")?;
+    let map = ShapeMap::learn(
+        &mut full,
+        &map_motions(rest),
+        &MapConfig::default(),
+        &mut || true,
+    )?
+    .context("the prior has coefficients")?;
     let error = map.error;
     let mut mapped = new().with_map(map);
     let motion = Routine::Mixture.motion(rest, 30.0, 1);

@@ -62,20 +62,7 @@ pub(super) fn rows(file: &Path, config: Option<&Path>) -> anyhow::Result<Vec<Row
     };
     let name = name(file);
     let out = std::env::temp_dir().join(format!("effigy-{}-{name}", std::process::id()));
-    let args = ChainArgs {
-        headless: true,
-        out: out.clone(),
-        keyframes: None,
-        poses: None,
-        meshes: None,
-        record: None,
-        json: None,
-        screenshot: None,
-        screenshot_after: 0.0,
-        exit_after: None,
-        body: None,
-        config: config.map(Path::to_owned),
-    };
+    let args = ChainArgs { config: config.map(Path::to_owned), ..ChainArgs::headless(&out) };
     let report = report_of(input, &args, None, &Controls::none());
     // Its pictures are of no use here.
     fs::remove_dir_all(&out).ok();
