@@ -27,6 +27,7 @@ pub(crate) struct Report {
     /// Of the avatar that was driven last.
     pub(crate) fine_tune: Option<FineTuneFigures>,
     pub(crate) time_to_first_avatar_secs: Option<f64>,
+    pub(crate) preview: Option<PreviewScores>,
     pub(crate) latency_ms: Option<Latency>,
     pub(crate) stages_ms: BTreeMap<String, StageTime>,
     pub(crate) body: Option<BodyScores>,
@@ -47,6 +48,8 @@ pub(crate) struct FrameCounts {
     pub(crate) lost: u64,
     /// By cause.
     pub(crate) dropped: BTreeMap<String, u64>,
+    /// Of those that came too late for the chain.
+    pub(crate) dropped_while_fine_tuning: u64,
 }
 
 #[derive(Clone, Copy, Debug, Serialize)]
@@ -57,6 +60,18 @@ pub(crate) struct FineTuneFigures {
     pub(crate) held_out_mm: f32,
     /// `None` where the drive evaluates the full field.
     pub(crate) map_p95_mm: Option<f32>,
+}
+
+/// What was shown before the first avatar.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub(crate) struct PreviewScores {
+    /// From its last keyframe to something that can be driven.
+    pub(crate) secs: f64,
+    pub(crate) steps: usize,
+    pub(crate) map_p95_mm: Option<f32>,
+    /// In true poses.
+    #[serde(flatten)]
+    pub(crate) scores: SurfaceScores,
 }
 
 /// From a frame's delivery to its posed body (and avatar, once there is one).
@@ -135,6 +150,12 @@ impl fmt::Display for Report {
                 f,
                 "body        MPJPE {:.1} mm, V2V {:.1} mm",
                 body.mpjpe_mm, body.v2v_mm
+            )?;
+        }
+        if let Some(PreviewScores { secs, steps, scores, .. }) = &self.preview {
+            writeln!(
+                f,
+                "preview     after {secs:.1} s and {steps} steps  {scores}"
             )?;
         }
         for (name, scores) in [

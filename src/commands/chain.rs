@@ -28,7 +28,7 @@ use crate::{
         schedule::Schedule,
         settings::Settings,
     },
-    report::{FineTuneFigures, FrameCounts, Latency, Report, SCHEMA},
+    report::{FineTuneFigures, FrameCounts, Latency, PreviewScores, Report, SCHEMA, SurfaceScores},
     say::say,
 };
 
@@ -137,9 +137,8 @@ pub(crate) fn report_of(
         let recorder = Recorder::create(path, &calibration, &input.metadata, when_slow)?;
         outputs.record_to(recorder);
     }
-    let by_count = Schedule::AfterFrames(settings.schedule.swap_after_frames);
     let schedule = match input.pace {
-        Pace::LockStep => input.decided.unwrap_or(by_count),
+        Pace::LockStep => input.decided.unwrap_or(Schedule::AfterFrames),
         Pace::RealTime => Schedule::WhenReady,
     };
     let depth = calibration.depth;
@@ -160,7 +159,7 @@ pub(crate) fn report_of(
         &mut report,
         &log,
         &body,
-        (avatar.avatar(), &settings.canonicalise),
+        (&avatar, &settings.canonicalise),
         input.truth.as_ref(),
     )?;
     report.seconds_total = clock.secs();
@@ -192,6 +191,7 @@ fn report(source: String, log: &RunLog) -> Report {
             tracked: log.tracked.len() as u64,
             partial: log.partial,
             lost: log.lost,
+            dropped_while_fine_tuning: log.dropped_while_fine_tuning,
             dropped: log.dropped.clone(),
         },
         start_up_secs: log.start_up_secs,
@@ -207,6 +207,12 @@ fn report(source: String, log: &RunLog) -> Report {
             map_p95_mm: job.map_p95_mm,
         }),
         time_to_first_avatar_secs: log.jobs.first().map(|job| job.total_secs),
+        preview: log.preview.map(|preview| PreviewScores {
+            secs: preview.secs,
+            steps: preview.steps,
+            map_p95_mm: preview.map_p95_mm,
+            scores: SurfaceScores::default(),
+        }),
         latency_ms: latency(log),
         stages_ms: log.timings.summary(),
         body: None,

@@ -16,7 +16,7 @@ use image::imageops;
 
 use crate::{
     cli::{CapeGender, DatasetArgs, DatasetMakeArgs, DatasetViewArgs, DatasetWhat, ImportCapeArgs},
-    interrupt,
+    interrupt::{self, Stopped},
     progress::Progress,
     say::say,
 };
@@ -52,8 +52,7 @@ fn make_dataset(args: &DatasetMakeArgs) -> anyhow::Result<()> {
     let made = make(&plan, &builtin::body(), &args.out, &go_on)?;
     progress.finish();
     let Some(manifest) = made else {
-        say!("stopped; the same command goes on from here");
-        return Ok(());
+        return Err(Stopped("the same command goes on from here".to_owned()).into());
     };
     say!(
         "{}{}",
@@ -80,8 +79,7 @@ fn import(args: &ImportCapeArgs) -> anyhow::Result<()> {
     let imported = import_cape(&args.release, &body, &choice, &args.out, &go_on)?;
     progress.finish();
     let Some(manifest) = imported else {
-        say!("stopped; the same command goes on from here");
-        return Ok(());
+        return Err(Stopped("the same command goes on from here".to_owned()).into());
     };
     say!("{}", summary(&args.out, &manifest));
     Ok(())

@@ -11,10 +11,12 @@ use std::{
 };
 
 use anyhow::{Context as _, anyhow};
-use crossbeam::channel::{Receiver, Select, TryRecvError, bounded};
+use crossbeam::channel::{Receiver, RecvTimeoutError, Select, Sender, TryRecvError, bounded};
 use effigy_avatar::{
-    Avatar, CanonicalSamples, Canonicaliser, DriveConfig, Driver, ShapeMap, TopologyConfig,
+    Avatar, CanonicalSamples, Canonicaliser, DriveConfig, Driver, MapConfig, ShapeMap,
+    TopologyConfig,
     fine_tune::{FineTuneProgress, fine_tune},
+    hyper::HyperNetwork,
     keyframes::Keyframe,
     nn::Threads,
 };
@@ -22,7 +24,9 @@ use effigy_capture::CameraModel;
 use effigy_registration::{
     BodyModel,
     motion::{Motion, RestBody, Routine},
+    smpl::JOINT_COUNT,
 };
+use glam::Vec3;
 
 use super::{clock::Clock, settings::Settings};
 use crate::{interrupt, machine::Machine};
@@ -63,8 +67,25 @@ pub(crate) fn map_motions(rest: &RestBody) -> Vec<Motion> {
 pub(crate) struct AvatarJob {
     cancel: Arc<AtomicBool>,
     progress: Arc<Mutex<FineTuneProgress>>,
+    preview: Receiver<Preview>,
     result: Receiver<anyhow::Result<FinishedAvatar>>,
     thread: JoinHandle<()>,
+}
+
+/// An avatar that has learned for a short time only.
+pub(crate) struct Preview {
+    pub(crate) driver: Driver,
+    pub(crate) figures: PreviewFigures,
+}
+
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct PreviewFigures {
+    /// Steps that it has learned for.
+    pub(crate) steps: usize,
+    /// From the keyframes to something that can be driven.
+    pub(crate) secs: f64,
+    /// As [`JobFigures::map_p95_mm`].
+    pub(crate) map_p95_mm: Option<f32>,
 }
 
 pub(crate) struct FinishedAvatar {
@@ -96,6 +117,7 @@ impl AvatarJob {
         let cancel = Arc::new(AtomicBool::new(false));
         let progress = Arc::new(Mutex::new(FineTuneProgress::default()));
         let (sender, result) = bounded(1);
+        let (to_preview, preview) = bounded(1);
         let work = Work {
             keyframes,
             camera,
@@ -103,6 +125,7 @@ impl AvatarJob {
             settings: settings.clone(),
             cancel: Arc::clone(&cancel),
             progress: Arc::clone(&progress),
+            to_preview,
             beside,
             clock,
         };
@@ -114,12 +137,29 @@ impl AvatarJob {
                 drop(sender.send(work.run()));
             })
             .context("cannot start the fine-tuning thread")?;
-        Ok(Self { cancel, progress, result, thread })
+        Ok(Self { cancel, progress, preview, result, thread })
     }
 
     /// Whether the avatar is there.
     pub(crate) fn is_finished(&self) -> bool {
         !self.result.is_empty() || self.thread.is_finished()
+    }
+
+    /// Whether there is something to show before the avatar.
+    pub(crate) fn has_preview(&self) -> bool {
+        !self.preview.is_empty()
+    }
+
+    /// What there is to show before the avatar, waited for if need be; `None` if there will be nothing, or the user wants
+    /// to stop.
+    pub(crate) fn preview(&self) -> Option<Preview> {
+        loop {
+            match self.preview.recv_timeout(LOOK_EVERY) {
+                Ok(preview) => return Some(preview),
+                Err(RecvTimeoutError::Timeout) if !interrupt::requested() => {}
+                Err(_) => return None,
+            }
+        }
     }
 
     /// Returns when the avatar is there or the user wants to stop; `meanwhile` is called now and then.
@@ -189,6 +229,7 @@ struct Work {
     settings: Settings,
     cancel: Arc<AtomicBool>,
     progress: Arc<Mutex<FineTuneProgress>>,
+    to_preview: Sender<Preview>,
     beside: Beside,
     clock: Clock,
 }
@@ -228,52 +269,84 @@ impl Work {
         let prior = self.settings.prior_network(self.body.identity)?;
         let metres_per_unit = canonicaliser.subject().unit_box.metres_per_unit();
         let tuning_started = self.clock.secs();
+        let middle = samples[samples.len() / 2].theta;
+        let driver_of = |network: HyperNetwork, map: &MapConfig| {
+            self.driver_of(network, (&canonicaliser, &middle), map)
+        };
         let mut last = FineTuneProgress::default();
-        let config = &self.settings.fine_tune;
         let network = fine_tune(
             prior,
             &samples,
             metres_per_unit,
-            config,
+            &self.settings.fine_tune,
             &|| self.clock.secs(),
-            &mut |now| {
+            &mut |now, network| {
                 last = *now;
+                if now.step == self.settings.preview.steps && now.step < now.steps {
+                    let made = driver_of(network.clone(), &self.map_of_preview());
+                    self.show(made, started);
+                }
                 self.report(now)
             },
         )?;
         let fine_tune_secs = self.clock.secs() - tuning_started;
-        let middle = &samples[samples.len() / 2];
-        let avatar = Avatar::new(
-            canonicaliser.subject(),
-            Arc::new(network),
-            &**canonicaliser.skinning(),
-            &middle.theta,
-            &TopologyConfig::default(),
-        )?;
-        let mut driver = Driver::new(Arc::new(avatar), DriveConfig::default());
-        let map = self.map_of(&mut driver)?;
+        let (driver, map_p95_mm) = driver_of(network, &self.settings.map)?;
         let figures = JobFigures {
             steps: last.step as usize,
             loss: last.loss.total() as f32,
             held_out_mm: last.held_out_residual_m * 1e3,
             fine_tune_secs,
-            map_p95_mm: map.as_ref().map(|map| map.error.p95_mm),
+            map_p95_mm,
             total_secs: self.clock.secs() - started,
-        };
-        let driver = match map {
-            Some(map) => driver.with_map(map),
-            None => driver,
         };
         Ok(FinishedAvatar { driver, figures })
     }
 
-    /// What drives the avatar without its field, if that is near enough.
-    fn map_of(&self, driver: &mut Driver) -> anyhow::Result<Option<ShapeMap>> {
-        let config = &self.settings.map;
-        let motions = map_motions(&RestBody::of(&self.body, &driver.avatar().subject.betas));
+    /// What drives an avatar with this network, and how far its map is from the field if it has one: only what is near
+    /// enough drives without the field.
+    fn driver_of(
+        &self,
+        network: HyperNetwork,
+        (canonicaliser, theta): (&Canonicaliser, &[Vec3; JOINT_COUNT]),
+        map: &MapConfig,
+    ) -> anyhow::Result<(Driver, Option<f32>)> {
+        let subject = canonicaliser.subject();
+        let skinning = &**canonicaliser.skinning();
+        let topology = TopologyConfig::default();
+        let avatar = Avatar::new(subject, Arc::new(network), skinning, theta, &topology)?;
+        let mut driver = Driver::new(Arc::new(avatar), DriveConfig::default());
+        let motions = map_motions(&RestBody::of(&self.body, &subject.betas));
         let go_on = &mut || !self.cancel.load(Ordering::Relaxed);
-        let map = ShapeMap::learn(driver, &motions, config, go_on)?;
-        Ok(map.filter(|map| map.error.p95_mm <= config.most_p95_mm))
+        let learned = ShapeMap::learn(&mut driver, &motions, map, go_on)?;
+        let near = learned.filter(|learned| learned.error.p95_mm <= map.most_p95_mm);
+        let p95_mm = near.as_ref().map(|near| near.error.p95_mm);
+        let driver = match near {
+            Some(near) => driver.with_map(near),
+            None => driver,
+        };
+        Ok((driver, p95_mm))
+    }
+
+    /// A preview is driven by its map, whatever that is worth: the field would take the time that fine-tuning needs.
+    fn map_of_preview(&self) -> MapConfig {
+        let poses_a_motion = self.settings.preview.poses_a_motion;
+        MapConfig { poses_a_motion, most_p95_mm: f32::INFINITY, ..self.settings.map }
+    }
+
+    /// Without a preview one waits a little longer, no more.
+    fn show(&self, made: anyhow::Result<(Driver, Option<f32>)>, started: f64) {
+        match made {
+            Ok((driver, map_p95_mm)) => {
+                let figures = PreviewFigures {
+                    steps: self.settings.preview.steps as usize,
+                    secs: self.clock.secs() - started,
+                    map_p95_mm,
+                };
+                // Nobody listens any more after a cancellation.
+                drop(self.to_preview.send(Preview { driver, figures }));
+            }
+            Err(error) => tracing::warn!(%error, "no preview of the avatar"),
+        }
     }
 
     fn report(&self, now: &FineTuneProgress) -> ControlFlow<()> {

@@ -7,7 +7,7 @@ use effigy_capture::{CameraModel, FrameId};
 use effigy_registration::{BodyModel, RegisteredFrame, SmoothConfig, Smoother};
 
 use super::{
-    avatar_job::{AvatarJob, Beside, FinishedAvatar, JobFigures},
+    avatar_job::{AvatarJob, Beside, FinishedAvatar, JobFigures, Preview, PreviewFigures},
     clock::{Clock, Timings},
     schedule::{Decision, Schedule},
     settings::Settings,
@@ -24,6 +24,8 @@ pub(crate) struct AvatarStage {
     smoother: Smoother,
     making: Option<Making>,
     made: Option<Made>,
+    /// What was shown while the first avatar was still learned.
+    preview: Option<(Arc<Avatar>, PreviewFigures)>,
     gave_up: bool,
     /// Whether the chain loses frames as it is.
     overloaded: bool,
@@ -40,6 +42,7 @@ struct Making {
     job: AvatarJob,
     frames_since_begun: u64,
     keyframes: Vec<FrameId>,
+    looked_for_preview: bool,
 }
 
 struct Made {
@@ -66,6 +69,7 @@ impl AvatarStage {
             smoother: Smoother::new(settings.smooth.unwrap_or(SmoothConfig::Off)),
             making: None,
             made: None,
+            preview: None,
             gave_up: false,
             overloaded: false,
             requests: Vec::new(),
@@ -154,6 +158,11 @@ impl AvatarStage {
         self.made.as_ref().map(|made| made.driver.avatar())
     }
 
+    /// What was driven before the first avatar, and what it took.
+    pub(crate) fn preview(&self) -> Option<&(Arc<Avatar>, PreviewFigures)> {
+        self.preview.as_ref()
+    }
+
     /// What making each avatar took, the first one first.
     pub(crate) fn figures(&self) -> &[JobFigures] {
         &self.figures
@@ -202,12 +211,21 @@ impl AvatarStage {
     /// What is due without anybody having asked for it.
     fn decide(&self) -> Option<Decision> {
         if let Some(making) = &self.making {
-            let due = match self.schedule {
-                Schedule::AfterFrames(frames) => making.frames_since_begun >= frames,
-                Schedule::WhenReady => making.job.is_finished(),
+            let due = |after_frames: u64, is_ready: bool| match self.schedule {
+                Schedule::AfterFrames => making.frames_since_begun >= after_frames,
+                Schedule::WhenReady => is_ready,
                 Schedule::AsRecorded(_) => false,
             };
-            return due.then_some(Decision::TakeOver);
+            if due(
+                self.settings.schedule.swap_after_frames,
+                making.job.is_finished(),
+            ) {
+                return Some(Decision::TakeOver);
+            }
+            let previewed = self.made.is_some() || making.looked_for_preview;
+            let frames = self.settings.schedule.preview_after_frames;
+            return (!previewed && due(frames, making.job.has_preview()))
+                .then_some(Decision::Preview);
         }
         let wanted = match &self.made {
             None => self.selector.is_full(),
@@ -230,6 +248,10 @@ impl AvatarStage {
     fn perform(&mut self, decision: Decision) -> anyhow::Result<()> {
         match decision {
             Decision::Begin => self.begin(),
+            Decision::Preview => {
+                self.show_preview();
+                Ok(())
+            }
             Decision::TakeOver => self.take_over(),
             Decision::Cancel => {
                 self.gave_up |= self.making.take().is_some();
@@ -238,6 +260,7 @@ impl AvatarStage {
             Decision::StartOver => {
                 self.selector.clear();
                 (self.making, self.made, self.gave_up) = (None, None, false);
+                self.preview = None;
                 Ok(())
             }
         }
@@ -245,7 +268,7 @@ impl AvatarStage {
 
     fn beside(&self) -> Beside {
         match (&self.schedule, self.overloaded) {
-            (Schedule::AfterFrames(_) | Schedule::AsRecorded(_), _) => Beside::Nothing,
+            (Schedule::AfterFrames | Schedule::AsRecorded(_), _) => Beside::Nothing,
             (Schedule::WhenReady, false) => Beside::LiveChain,
             (Schedule::WhenReady, true) => Beside::OverloadedChain,
         }
@@ -264,8 +287,23 @@ impl AvatarStage {
             (self.beside(), self.clock),
         )?;
         self.gave_up = false;
-        self.making = Some(Making { job, frames_since_begun: 0, keyframes });
+        self.making =
+            Some(Making { job, frames_since_begun: 0, keyframes, looked_for_preview: false });
         Ok(())
+    }
+
+    /// Waits for the preview of the avatar that was begun, if there will be one.
+    fn show_preview(&mut self) {
+        let Some(making) = &mut self.making else {
+            return;
+        };
+        making.looked_for_preview = true;
+        if let Some(Preview { driver, figures }) = making.job.preview() {
+            let keyframes = making.keyframes.clone();
+            self.learned_from.extend(&keyframes);
+            self.preview = Some((Arc::clone(driver.avatar()), figures));
+            self.made = Some(Made { driver, frames_driven: 0, keyframes });
+        }
     }
 
     /// Waits for the avatar that was begun, if it is not there yet, unless the user wants to stop.

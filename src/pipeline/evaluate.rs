@@ -13,6 +13,7 @@ use effigy_sim_sensor::{GroundTruth, Truth};
 use glam::Vec3;
 
 use super::{
+    avatar_stage::AvatarStage,
     poses::transformed,
     run_log::{RunLog, TrackedSample},
 };
@@ -32,9 +33,10 @@ pub(crate) fn evaluate(
     report: &mut Report,
     log: &RunLog,
     body: &Arc<BodyModel>,
-    (avatar, canonicalise): (Option<&Arc<Avatar>>, &CanonicaliseConfig),
+    (stage, canonicalise): (&AvatarStage, &CanonicaliseConfig),
     truth: Option<&Truth>,
 ) -> anyhow::Result<()> {
+    let avatar = stage.avatar();
     let unseen: Vec<&TrackedSample> = log.unseen().collect();
     let observed = evenly(&unseen, OBSERVED_FRAMES);
     let bare_mesh = |params: &BodyParams| mesh(body.pose(params).vertices, &body.triangles);
@@ -54,11 +56,13 @@ pub(crate) fn evaluate(
             .with_observed(bare.observed_mm);
         let tracked = judge.scores(Poses::Tracked, &bare_mesh)?;
         report.bare_body_tracked = Some(tracked.with_observed(bare.observed_mm));
+        let in_full = |avatar| FullSurface::new(avatar, body, canonicalise);
+        if let (Some((avatar, _)), Some(preview)) = (stage.preview(), &mut report.preview) {
+            let surface = in_full(avatar)?;
+            preview.scores = judge.scores(Poses::True, &|params| surface.posed(params))?;
+        }
         if let Some(avatar) = avatar {
-            let surface = FullSurface {
-                avatar,
-                skinning: canonicalise.skinning_of(body, &avatar.subject.betas)?,
-            };
+            let surface = in_full(avatar)?;
             let avatar_mesh = |params: &BodyParams| surface.posed(params);
             report.avatar = Some(judge.scores(Poses::True, &avatar_mesh)?);
             report.avatar_tracked = Some(judge.scores(Poses::Tracked, &avatar_mesh)?);
@@ -217,7 +221,16 @@ struct FullSurface<'a> {
     skinning: Arc<dyn Skinning>,
 }
 
-impl FullSurface<'_> {
+impl<'a> FullSurface<'a> {
+    fn new(
+        avatar: &'a Avatar,
+        body: &Arc<BodyModel>,
+        canonicalise: &CanonicaliseConfig,
+    ) -> anyhow::Result<Self> {
+        let skinning = canonicalise.skinning_of(body, &avatar.subject.betas)?;
+        Ok(Self { avatar, skinning })
+    }
+
     fn posed(&self, params: &BodyParams) -> TriangleMesh {
         extract_posed(self.avatar, &*self.skinning, params, RESOLUTION)
     }

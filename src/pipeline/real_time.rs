@@ -251,6 +251,9 @@ fn drive(
         let was_making = avatar.is_making();
         let registered = &tracked.registered;
         log.delivered(&delivered.frame);
+        if was_making {
+            log.dropped_while_fine_tuning += delivered.dropped_so_far - log.dropped_so_far;
+        }
         log.dropped_so_far = delivered.dropped_so_far;
         log.playback = delivered.playback;
         avatar.note_load(load.is_too_high(delivered.dropped_so_far));

@@ -11,7 +11,7 @@ use effigy_viewer::PlaybackView;
 use glam::Vec3;
 
 use super::{
-    avatar_job::JobFigures,
+    avatar_job::{JobFigures, PreviewFigures},
     avatar_stage::AvatarStage,
     clock::{Clock, Timings},
     track_stage::TrackedFrame,
@@ -76,9 +76,12 @@ pub(crate) struct RunLog {
     pub(crate) partial: u64,
     pub(crate) lost: u64,
     pub(crate) dropped: BTreeMap<String, u64>,
+    /// Of those that came too late.
+    pub(crate) dropped_while_fine_tuning: u64,
     pub(crate) keyframes: Vec<FrameId>,
     /// What making each avatar took, the first one first.
     pub(crate) jobs: Vec<JobFigures>,
+    pub(crate) preview: Option<PreviewFigures>,
     pub(crate) timings: Timings,
     pub(crate) latencies: Vec<FrameLatency>,
     /// Frames that came too late to be looked at.
@@ -102,8 +105,10 @@ impl RunLog {
             partial: 0,
             lost: 0,
             dropped: BTreeMap::new(),
+            dropped_while_fine_tuning: 0,
             keyframes: Vec::new(),
             jobs: Vec::new(),
+            preview: None,
             timings: Timings::default(),
             latencies: Vec::new(),
             dropped_so_far: 0,
@@ -166,6 +171,7 @@ impl RunLog {
     pub(crate) fn avatar_made(&mut self, avatar: &mut AvatarStage) {
         self.keyframes = avatar.keyframe_ids();
         self.jobs = avatar.figures().to_vec();
+        self.preview = avatar.preview().map(|(_, figures)| *figures);
         self.learned_from.clone_from(avatar.learned_from());
         self.timings.merge(std::mem::take(&mut avatar.timings));
     }

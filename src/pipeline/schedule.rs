@@ -15,6 +15,8 @@ pub(crate) const DECISION_EVENT: &str = "effigy.avatar";
 pub(crate) enum Decision {
     /// Fine-tuning starts with the keyframes there are.
     Begin,
+    /// What the avatar that was begun has learned so far is driven from this frame on.
+    Preview,
     /// The avatar that was begun is driven from this frame on.
     TakeOver,
     Cancel,
@@ -31,8 +33,8 @@ pub(crate) struct Decided {
 /// Who decides.
 #[derive(Clone, Debug)]
 pub(crate) enum Schedule {
-    /// Avatars take over a fixed number of frames after they were begun, waited for if need be: repeatable.
-    AfterFrames(u64),
+    /// Previews and avatars are shown fixed numbers of frames after they were begun, waited for if need be: repeatable.
+    AfterFrames,
     /// Avatars take over as soon as they are there: live.
     WhenReady,
     /// What a live run decided happens again, at the same frames.

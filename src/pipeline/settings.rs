@@ -40,7 +40,24 @@ pub(crate) struct Settings {
     pub(crate) fine_tune: FineTuneConfig,
     /// How an avatar's shape is learned as a function of the pose, so that the drive need not evaluate its field.
     pub(crate) map: MapConfig,
+    pub(crate) preview: PreviewConfig,
     pub(crate) schedule: ScheduleConfig,
+}
+
+/// The avatar that is shown while the first one is still learned: the same network after fewer steps.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub(crate) struct PreviewConfig {
+    /// Steps of fine-tuning after which it is made; 0 for none.
+    pub(crate) steps: u32,
+    /// Poses of each motion that its map is learned from, fewer than an avatar's: it must be quick.
+    pub(crate) poses_a_motion: usize,
+}
+
+impl Default for PreviewConfig {
+    fn default() -> Self {
+        Self { steps: 20, poses_a_motion: 3 }
+    }
 }
 
 /// When background results take effect.
@@ -50,6 +67,8 @@ pub(crate) struct ScheduleConfig {
     /// In a replay an avatar takes over this many frames after it was asked for; the replay waits
     /// there if need be, so that two replays are the same.
     pub(crate) swap_after_frames: u64,
+    /// In a replay the preview is shown this many frames after its avatar was asked for.
+    pub(crate) preview_after_frames: u64,
     /// An avatar is made better when this many of its keyframes have given way to others...
     pub(crate) improve_new_keyframes: usize,
     /// ...and it has been driven for this long.
@@ -59,7 +78,12 @@ pub(crate) struct ScheduleConfig {
 impl Default for ScheduleConfig {
     fn default() -> Self {
         // Three seconds at 30 Hz: long enough that fine-tuning has the chain's idle time to itself.
-        Self { swap_after_frames: 90, improve_new_keyframes: 3, improve_after_frames: 150 }
+        Self {
+            swap_after_frames: 90,
+            preview_after_frames: 15,
+            improve_new_keyframes: 3,
+            improve_after_frames: 150,
+        }
     }
 }
 

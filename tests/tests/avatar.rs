@@ -209,7 +209,7 @@ fn a_fine_tuned_avatar_is_nearer_to_the_person_than_the_bare_body() {
         subject.unit_box.metres_per_unit(),
         &config,
         &|| 0.0,
-        &mut |progress| {
+        &mut |progress, _| {
             if progress.step % 40 == 0 {
                 println!(
                     "{}: {:.2} mm",

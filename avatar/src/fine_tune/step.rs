@@ -38,15 +38,15 @@ pub struct FineTuneProgress {
     pub left_secs: f64,
 }
 
-/// Fine-tunes until all steps are done, or until `on_progress` says to stop: the network learned so far is
-/// returned in either case. `clock` gives seconds from any origin.
+/// Fine-tunes until all steps are done, or until `on_progress`, which sees the network as it is after each step, says to
+/// stop: the network learned so far is returned in either case. `clock` gives seconds from any origin.
 pub fn fine_tune(
     network: HyperNetwork,
     samples: &[CanonicalSamples],
     metres_per_unit: f32,
     config: &FineTuneConfig,
     clock: &dyn Fn() -> f64,
-    on_progress: &mut dyn FnMut(&FineTuneProgress) -> ControlFlow<()>,
+    on_progress: &mut dyn FnMut(&FineTuneProgress, &HyperNetwork) -> ControlFlow<()>,
 ) -> Result<HyperNetwork, AvatarError> {
     let mut tuner = FineTuner::new(network, samples, metres_per_unit, config)?;
     let start_secs = clock();
@@ -65,7 +65,7 @@ pub fn fine_tune(
         progress.elapsed_secs = clock() - start_secs;
         let left = f64::from(config.steps - progress.step) / f64::from(progress.step);
         progress.left_secs = progress.elapsed_secs * left;
-        if on_progress(&progress).is_break() {
+        if on_progress(&progress, tuner.network()).is_break() {
             break;
         }
     }

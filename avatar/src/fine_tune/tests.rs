@@ -73,14 +73,14 @@ fn keyframes() -> Vec<CanonicalSamples> {
 }
 
 fn learned(config: &FineTuneConfig) -> HyperNetwork {
-    let mut ignore = |_: &_| ControlFlow::Continue(());
+    let mut ignore = |_: &_, _: &_| ControlFlow::Continue(());
     fine_tune(network(), &keyframes(), 1.0, config, &|| 0.0, &mut ignore).unwrap()
 }
 
 #[test]
 fn a_ball_that_grows_with_the_pose_is_learned_with_its_sign() {
     let mut residuals_m = Vec::new();
-    let mut report = |now: &super::FineTuneProgress| {
+    let mut report = |now: &super::FineTuneProgress, _: &_| {
         residuals_m.push(now.held_out_residual_m);
         ControlFlow::Continue(())
     };
@@ -133,7 +133,7 @@ fn points_of_weight_zero_are_never_drawn() {
         samples.weights.push(0.0);
     }
     let config = FineTuneConfig { steps: 5, held_out_share: 0.0, ..config() };
-    let mut ignore = |_: &_| ControlFlow::Continue(());
+    let mut ignore = |_: &_, _: &_| ControlFlow::Continue(());
     let with = fine_tune(network(), &spoiled, 1.0, &config, &|| 0.0, &mut ignore).unwrap();
     assert_eq!(with, learned(&config));
 }
@@ -143,7 +143,7 @@ fn rates_that_blow_up_end_in_an_error() {
     let mut config = config();
     config.rates.field = 1e30;
     config.warm_up_steps = 1;
-    let mut ignore = |_: &_| ControlFlow::Continue(());
+    let mut ignore = |_: &_, _: &_| ControlFlow::Continue(());
     let error = fine_tune(network(), &keyframes(), 1.0, &config, &|| 0.0, &mut ignore).unwrap_err();
     assert!(
         matches!(error, AvatarError::LossNotFinite { .. }),

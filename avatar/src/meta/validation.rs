@@ -59,7 +59,7 @@ impl Validation {
                 person.metres_per_unit,
                 &self.fine_tune,
                 &|| 0.0,
-                &mut |_| ControlFlow::Continue(()),
+                &mut |_, _| ControlFlow::Continue(()),
             )?;
             sum_mm += person.error_mm(&own) / self.people.len() as f64;
             tuned.push(own);

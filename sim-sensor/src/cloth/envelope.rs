@@ -17,6 +17,8 @@ use super::{
 
 /// Skin this close under or over a garment that faces the same way is under it.
 const TUCK_REACH_M: f32 = 0.010;
+/// So is a garment this close under or over one that is worn over it: where arms are raised, shirts come through jackets.
+const LAYER_REACH_M: f32 = 0.030;
 /// What is under a garment is drawn at least this far below it.
 const TUCK_M: f32 = 0.003;
 /// Cameras around a person for finding what can be seen: azimuths, height in radians, all from this far.
@@ -90,8 +92,13 @@ impl Wear {
 /// Draws what is under a garment below it, so that it does not show through between the cloth's points.
 fn tuck(mesh: &mut TriangleMesh, layers: &[u8], garments: &[Collider]) {
     for (v, &layer) in layers.iter().enumerate() {
+        let reach_m = if layer == 0 {
+            TUCK_REACH_M
+        } else {
+            LAYER_REACH_M
+        };
         for garment in garments.iter().skip(layer as usize) {
-            let Some(touch) = garment.nearest(mesh.vertices[v], TUCK_REACH_M, NONE) else {
+            let Some(touch) = garment.nearest(mesh.vertices[v], reach_m, NONE) else {
                 continue;
             };
             if !touch.on_rim

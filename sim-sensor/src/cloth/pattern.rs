@@ -319,6 +319,8 @@ impl Tailor {
         let trousers = self.slim_trousers();
         Pattern {
             name: "wide trousers",
+            // Nothing holds them up at the ankles.
+            limbs: Limbs::Legs { end: self.random.between(9, 1.82, 1.92) },
             ease: Ease {
                 trunk_m: self.by_fit(0.010, 0.016),
                 limb_m: self.by_fit(0.024, 0.040),

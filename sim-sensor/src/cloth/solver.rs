@@ -14,6 +14,8 @@ use super::{
 const GRAVITY: Vec3 = Vec3::new(0.0, -9.81, 0.0);
 /// Nothing in a wardrobe is faster.
 const MAX_SPEED_M_S: f32 = 12.0;
+/// Cloth lies this high on the floor.
+const ON_FLOOR_M: f32 = 0.002;
 /// Contacts are kept ready this far beyond touching.
 const MARGIN_M: f32 = 0.004;
 /// The furthest that anything but its own arm pushes a sleeve in one step.
@@ -47,6 +49,8 @@ pub(super) struct Cloth {
     rings: Vec<Ring>,
     /// Where arms are at the end of the step.
     pub(super) arm_axes: ArmAxes,
+    /// The height of the floor.
+    pub(super) floor_m: f32,
     /// What touches its own arm; nothing else of the body pushes it.
     on_arm: Vec<bool>,
     friction: f32,
@@ -147,6 +151,7 @@ impl Cloth {
             sleeves: garment.arms.clone(),
             rings: garment.rings.clone(),
             arm_axes: [[Vec3::ZERO; 4]; 2],
+            floor_m: f32::NEG_INFINITY,
             on_arm: Vec::new(),
             friction: fabric.friction,
             drag: fabric.drag,
@@ -243,6 +248,7 @@ impl Cloth {
         self.contacts.clear();
         self.on_arm.clear();
         self.on_arm.resize(self.points.len(), false);
+        self.find_floor();
         for (obstacle, searches) in obstacles.iter().zip(&mut self.searches) {
             let near_m = obstacle.thickness_m + MARGIN_M;
             for (v, &point) in self.points.iter().enumerate() {
@@ -293,6 +299,26 @@ impl Cloth {
                     barycentric: touch.barycentric,
                 });
             }
+        }
+    }
+
+    /// Before the body, which has the last word: a foot presses a hem onto the floor, not through itself.
+    fn find_floor(&mut self) {
+        let lowest_m = self.floor_m + ON_FLOOR_M;
+        for (v, point) in self.points.iter().enumerate() {
+            if point.y > lowest_m + MARGIN_M {
+                continue;
+            }
+            self.contacts.push(Contact {
+                point: v as u32,
+                normal: Vec3::Y,
+                offset_m: lowest_m,
+                moved: Vec3::ZERO,
+                pushed_m: 0.0,
+                layer: None,
+                triangle: NONE,
+                barycentric: Vec3::ZERO,
+            });
         }
     }
 

@@ -115,10 +115,7 @@ impl Wear {
         for pattern in kind.patterns(fit, seed) {
             let cut_on = if pattern.has_legs() { &seat } else { &form };
             let garment = sew(cut_on, &pattern, &garments, &form);
-            cloths.push(Cloth::new(
-                &garment,
-                &let_out(&garment, cut_on, &trials, fit),
-            ));
+            cloths.push(Cloth::new(&garment, &let_out(&garment, cut_on, &trials)));
             garments.push(garment);
         }
         let random = Randomness::new(seed, 0, 0xc10f);
@@ -264,9 +261,11 @@ impl Wear {
         }
         let anchors = self.anchors(pose);
         let arm_axes = self.arm_axes(pose);
+        let floor_m = self.floor_m();
         for (cloth, anchors) in self.cloths.iter_mut().zip(anchors) {
             cloth.anchors = anchors;
             cloth.arm_axes = arm_axes;
+            cloth.floor_m = floor_m;
         }
         for (layer, cloth) in self.layers.iter_mut().zip(&self.cloths) {
             layer.place(&cloth.points);
@@ -302,7 +301,9 @@ impl Wear {
             for arm in &mut self.arms {
                 arm.advance(&self.body.now);
             }
+            let floor_m = self.floor_m();
             for (number, cloth) in self.cloths.iter_mut().enumerate() {
+                cloth.floor_m = floor_m;
                 for (i, anchor) in cloth.anchors.iter_mut().enumerate() {
                     *anchor = anchors_from[number][i].lerp(anchors_to[number][i], share);
                 }
@@ -313,6 +314,12 @@ impl Wear {
             self.step_cloths(secs / steps as f32);
         }
         self.pose = *pose;
+    }
+
+    /// Where people of ours stand; recorded movement that goes deeper has its floor there.
+    fn floor_m(&self) -> f32 {
+        let heights = self.body.now.iter().map(|point| point.y);
+        heights.fold(0.0, f32::min)
     }
 
     /// Where a pose has shoulders, elbows, wrists and hands.

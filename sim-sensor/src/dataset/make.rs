@@ -69,6 +69,7 @@ pub(super) type MakeOne<'a> = dyn Fn(&SequencePlan, &mut dyn FnMut() -> bool) ->
 pub(super) fn make_all(work: &Work<'_>, one: &MakeOne<'_>) -> Result<Option<Manifest>, SimError> {
     let Work { plan, body, folder, go_on } = *work;
     fs::create_dir_all(folder).map_err(io(folder))?;
+    refuse_another(plan, folder)?;
     let (done, found) = (AtomicU64::new(0), AtomicU64::new(0));
     let progress = || MakeProgress {
         frames: done.load(Ordering::Relaxed),
@@ -113,6 +114,23 @@ pub(super) fn make_all(work: &Work<'_>, one: &MakeOne<'_>) -> Result<Option<Mani
     let text = serde_json::to_string_pretty(&manifest).expect("a manifest is plain data");
     write_whole(&folder.join(MANIFEST), (text + "\n").as_bytes())?;
     Ok(Some(manifest))
+}
+
+/// A folder keeps its data set: what took an hour is not replaced by a slip of the hand.
+fn refuse_another(plan: &DatasetPlan, folder: &Path) -> Result<(), SimError> {
+    let path = folder.join(MANIFEST);
+    let found = read_bounded(&path).ok();
+    let found = found.and_then(|text| serde_json::from_slice::<Manifest>(&text).ok());
+    match found {
+        Some(found) if (found.preset, found.seed) != (plan.preset, plan.seed) => {
+            let (preset, seed) = (found.preset, found.seed);
+            let problem = format!(
+                "here is another data set ({preset:?}, seed {seed}); choose an empty folder, or delete this one"
+            );
+            Err(SimError::Dataset { path, problem })
+        }
+        _ => Ok(()),
+    }
 }
 
 /// What an earlier run made from the same plan, with the same body and in today's schema, and its bytes.

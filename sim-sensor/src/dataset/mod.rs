@@ -26,6 +26,6 @@ pub use make::{MakeProgress, make};
 pub use manifest::{DATASET_SCHEMA, Dataset, Manifest, SequenceEntry};
 pub use minimal::MinimalBody;
 pub use outfit_name::OutfitName;
-pub use plan::{DatasetPlan, DatasetPreset, Role, SequencePlan, Split};
+pub use plan::{DatasetPlan, DatasetPreset, GENERATOR, Role, SequencePlan, Split};
 pub use sequence::{Sequence, SequenceFrame};
 pub use view::{SensorShot, protocol_camera};

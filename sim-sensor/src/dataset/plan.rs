@@ -69,6 +69,9 @@ pub struct SequencePlan {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub scenario: Option<Scenario>,
     pub frames: u32,
+    /// The [`GENERATOR`] that made it; zero for what is not simulated, and for what was made before there was a number.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub generator: u32,
 }
 
 /// A data set before it is made.
@@ -80,6 +83,17 @@ pub struct DatasetPlan {
     /// Surfaces in star pose are rounded to this.
     pub offset_step_m: f32,
     pub sequences: Vec<SequencePlan>,
+}
+
+/// Goes up whenever the same plan comes to other people, movements or clothes: what an earlier one made is made again.
+pub const GENERATOR: u32 = 3;
+
+#[expect(
+    clippy::trivially_copy_pass_by_ref,
+    reason = "serde passes a reference"
+)]
+fn is_zero(number: &u32) -> bool {
+    *number == 0
 }
 
 /// Finer than simulated cloth is true; half of it is the largest error of a coordinate.
@@ -150,10 +164,14 @@ fn prior(seed: u64) -> Vec<SequencePlan> {
     let random = Randomness::new(seed, 0, 0xda7a);
     (0..PEOPLE)
         .map(|person| {
-            let outfit = outfits[person as usize % outfits.len()];
-            // Each outfit gets another action the next time it is worn.
+            let (round, number) = (
+                person as usize / outfits.len(),
+                person as usize % outfits.len(),
+            );
+            let outfit = outfits[number];
+            // Each outfit gets another action each time it is worn: 5 and 12 have no common divisor.
             let shift = (random.uniform(0) * LEARNED_ACTIONS.len() as f32) as usize;
-            let action = LEARNED_ACTIONS[(person as usize * 5 + shift) % LEARNED_ACTIONS.len()];
+            let action = LEARNED_ACTIONS[(5 * round + 3 * number + shift) % LEARNED_ACTIONS.len()];
             let wearer = Wearer { split: Split::Train, subject: person, outfit };
             sequence(seed, wearer, action, Role::FineTune, FRAMES)
         })
@@ -171,7 +189,7 @@ fn cape_like(seed: u64) -> Vec<SequencePlan> {
         for k in 0..2 {
             let number = subject as usize * 2 + k;
             let outfit = outfits[number % outfits.len()];
-            let action = LEARNED_ACTIONS[(number * 3) % LEARNED_ACTIONS.len()];
+            let action = LEARNED_ACTIONS[(number * 5) % LEARNED_ACTIONS.len()];
             let wearer = Wearer { split: Split::Train, subject, outfit };
             sequences.push(sequence(seed, wearer, action, Role::FineTune, TRAIN_FRAMES));
         }
@@ -267,6 +285,19 @@ struct Wearer {
     outfit: OutfitKind,
 }
 
+impl Wearer {
+    /// The size: what the tables call close-fitting is; all else is drawn from tight to loose.
+    fn fit(self) -> Option<f32> {
+        const CLOSE: f32 = 0.1;
+        let close = [
+            OutfitKind::TshirtTrousers,
+            OutfitKind::LongsleeveTrousers,
+            OutfitKind::PoloTrousers,
+        ];
+        (self.split == Split::Test && close.contains(&self.outfit)).then_some(CLOSE)
+    }
+}
+
 fn sequence(seed: u64, wearer: Wearer, action: Routine, role: Role, frames: u32) -> SequencePlan {
     let Wearer { split, subject, outfit } = wearer;
     let first = match split {
@@ -290,11 +321,13 @@ fn sequence(seed: u64, wearer: Wearer, action: Routine, role: Role, frames: u32)
             likeness: Likeness::Individual,
             motion: MotionChoice::Routine(action),
             outfit,
+            fit: wearer.fit(),
             seconds: frames as f32 / KEPT_RATE_HZ,
             rate_hz: Some(KEPT_RATE_HZ),
             noise: Noise::None,
             ..Scenario::default()
         }),
         frames,
+        generator: GENERATOR,
     }
 }

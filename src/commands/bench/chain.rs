@@ -60,21 +60,30 @@ fn rows_of(report: &Report) -> Vec<Row> {
         add(&format!("{stage}, p95"), times.map(|of| of.p95), "ms");
     }
     let dropped: u64 = report.frames.dropped.values().sum();
+    let while_tuning = report.frames.dropped_while_fine_tuning;
+    let besides = dropped.saturating_sub(while_tuning);
     add("frames delivered", Some(report.frames.delivered as f64), "");
-    add("frames dropped", Some(dropped as f64), "");
+    add(
+        "frames dropped while fine-tuning",
+        Some(while_tuning as f64),
+        "",
+    );
+    add("frames dropped otherwise", Some(besides as f64), "");
+    let preview = report.preview.as_ref();
+    add("time to the preview, live", preview.map(|of| of.secs), "s");
     add(
         "time to the first avatar, live",
         report.time_to_first_avatar_secs,
         "s",
     );
-    let (avatar, bare) = (report.avatar.as_ref(), report.bare_body.as_ref());
-    if let (Some(ours), Some(bare)) = (
-        avatar.and_then(|of| of.d_f_cm),
-        bare.and_then(|of| of.d_f_cm),
-    ) {
-        rows.push(
-            Row::new("D_f of the avatar", ours, "cm").against("the bare body's", bare / ours),
-        );
+    let bare_cm = report.bare_body.and_then(|of| of.d_f_cm);
+    for (name, scores) in [
+        ("D_f of the preview", preview.map(|of| of.scores)),
+        ("D_f of the avatar", report.avatar),
+    ] {
+        if let (Some(ours), Some(bare)) = (scores.and_then(|of| of.d_f_cm), bare_cm) {
+            rows.push(Row::new(name, ours, "cm").against("the bare body's", bare / ours));
+        }
     }
     rows
 }

@@ -26,6 +26,7 @@ use self::{
 use crate::{
     cli::{TrainArgs, TrainHyperArgs, TrainPreset, TrainShared, TrainWhat},
     files,
+    interrupt::Stopped,
     pipeline::settings::Settings,
     say::say,
 };
@@ -145,8 +146,8 @@ impl<'a> Job<'a> {
     ) -> anyhow::Result<()> {
         let checkpoint = self.args.checkpoint();
         let Some(mut network) = trained else {
-            say!("stopped; `--resume` goes on from {}", checkpoint.display());
-            return Ok(());
+            let how = format!("`--resume` goes on from {}", checkpoint.display());
+            return Err(Stopped(how).into());
         };
         let data = &self.people.described;
         network.provenance = Provenance {

@@ -13,7 +13,8 @@ use effigy_sim_sensor::dataset::Dataset;
 use super::clouds::Clouds;
 use crate::{
     cli::{TrainPreset, TrainSkinningArgs},
-    files, interrupt,
+    files,
+    interrupt::{self, Stopped},
     pipeline::clock::Clock,
     progress::Progress,
     say::say,
@@ -78,8 +79,8 @@ pub(crate) fn run(args: &TrainSkinningArgs) -> anyhow::Result<()> {
     };
     let trained = train_skinning(&body, &clouds, &config, Some(&checkpoint), &mut on_progress)?;
     let Some((mut networks, looks)) = trained else {
-        say!("stopped; `--resume` goes on from {}", checkpoint.display());
-        return Ok(());
+        let how = format!("`--resume` goes on from {}", checkpoint.display());
+        return Err(Stopped(how).into());
     };
     networks.provenance.training = format!(
         "effigy train skinning --preset live --seed {} ({} steps), data set of seed {}",

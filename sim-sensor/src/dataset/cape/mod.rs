@@ -137,6 +137,7 @@ fn plan(
             action,
             scenario: None,
             frames: frames as u32,
+            generator: 0,
         });
         files.insert(name, recorded);
     }

@@ -3,6 +3,7 @@
 use std::{
     fs,
     io::{Cursor, Read as _, Write as _},
+    sync::atomic::{AtomicU64, Ordering},
 };
 
 use effigy_capture::FrameId;
@@ -12,7 +13,7 @@ use zip::{ZipArchive, ZipWriter, write::SimpleFileOptions};
 
 use super::{made, plan};
 use crate::dataset::{
-    Dataset, Manifest, Sequence, SequenceFrame,
+    Dataset, DatasetPlan, Manifest, Sequence, SequenceFrame,
     archive::Packer,
     make,
     packing::{pack, unpack},
@@ -257,6 +258,30 @@ fn a_full_disk_is_named_and_a_second_run_goes_on() {
     );
     let again = made(&plan, folder.path());
     assert_eq!(again.manifest(), made(&plan, whole.path()).manifest());
+}
+
+#[test]
+fn a_folder_keeps_its_data_set_and_what_another_generator_made_is_made_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let plan = plan();
+    let whole = made(&plan, folder.path());
+    let other = DatasetPlan { seed: plan.seed + 1, ..plan.clone() };
+    let error = make(&other, &builtin::body(), folder.path(), &|_| true)
+        .unwrap_err()
+        .to_string();
+    assert!(error.contains("another data set"), "{error}");
+    assert_eq!(made(&plan, folder.path()).manifest(), whole.manifest());
+
+    let mut newer = plan;
+    newer.sequences[0].generator += 1;
+    let found = AtomicU64::new(0);
+    make(&newer, &builtin::body(), folder.path(), &|now| {
+        found.fetch_max(now.frames_found, Ordering::Relaxed);
+        true
+    })
+    .unwrap();
+    let others = newer.sequences[1..].iter().map(|s| u64::from(s.frames));
+    assert_eq!(found.into_inner(), others.sum::<u64>());
 }
 
 #[test]

@@ -314,7 +314,7 @@ fn tuned(
         metres_per_unit,
         config,
         &secs,
-        &mut |_| go_on(),
+        &mut |_, _| go_on(),
     )?)
 }
 

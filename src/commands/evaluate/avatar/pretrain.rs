@@ -94,7 +94,7 @@ fn teach(
     }
     let secs = || clock.secs();
     // Residuals are of no interest here, so a unit is as good as a metre.
-    let taught = fine_tune(network, samples, 1.0, &config, &secs, &mut |_| go_on())?;
+    let taught = fine_tune(network, samples, 1.0, &config, &secs, &mut |_, _| go_on())?;
     Ok(Pretrained::Hyper(Box::new(taught)))
 }
 
