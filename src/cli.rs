@@ -496,6 +496,9 @@ pub(crate) struct EvaluateAvatarArgs {
     /// Only these methods, named as the tables name them
     #[arg(long, value_name = "METHOD", value_delimiter = ',', value_parser = kebab::<Method>)]
     pub(crate) methods: Vec<Method>,
+    /// Seeds of our rows in the few-shot table
+    #[arg(long, default_value_t = 3, value_parser = clap::value_parser!(u64).range(1..))]
+    pub(crate) seeds: u64,
     /// Every test person in every outfit, not only the four of the tables
     #[arg(long)]
     pub(crate) all: bool,

@@ -298,9 +298,9 @@ fn ctrl_c_ends_a_run_in_order_even_while_it_waits_for_an_avatar() {
         .stdout(Stdio::null())
         .spawn()
         .unwrap();
-    // After the last frame it says what it waits for.
+    // After the last frame it says what it waits for; until then lines begin with the number of frames.
     let mut said = BufReader::new(run.stderr.take().unwrap()).lines();
-    let waits = |line: io::Result<String>| line.unwrap().starts_with("fine-tuning");
+    let waits = |line: io::Result<String>| line.unwrap().starts_with("preview live");
     assert!(said.any(waits), "it waits for the avatar");
     let id = run.id().to_string();
     let told = Command::new("kill").args(["-INT", &id]).status().unwrap();

@@ -7,7 +7,7 @@ pub enum RegistrationError {
     #[error("{path}: {source}")]
     Io { path: PathBuf, source: std::io::Error },
     /// A motion file that does not say what its format asks for; line 0 is the file as a whole.
-    #[error("{path}, line {line}: expected {expected}, found {found}")]
+    #[error("{path}{}: expected {expected}, found {found}", at_line(*line))]
     MotionFile { path: PathBuf, line: usize, expected: String, found: String },
     /// A body file that is no zip archive of `NumPy` arrays, or a damaged one.
     #[error(
@@ -28,4 +28,13 @@ pub enum RegistrationError {
         "a surface to follow has {got} offsets, the body model {expected} vertices; was it made for another body?"
     )]
     SurfaceMismatch { got: usize, expected: usize },
+}
+
+/// Where in a text file, for people; nothing for the file as a whole.
+fn at_line(line: usize) -> String {
+    if line == 0 {
+        String::new()
+    } else {
+        format!(", line {line}")
+    }
 }

@@ -47,6 +47,8 @@ struct Making {
 
 struct Made {
     driver: Driver,
+    /// Driven until the avatar itself is there.
+    is_preview: bool,
     frames_driven: u64,
     keyframes: Vec<FrameId>,
 }
@@ -174,29 +176,26 @@ impl AvatarStage {
 
     /// What the stage is doing, for people.
     pub(crate) fn status(&self) -> String {
-        let live = if self.made.is_some() {
-            "avatar live"
-        } else {
-            ""
-        };
+        let live = self.made.as_ref().map(|made| made.is_preview);
         if let Some(now) = self.progress() {
-            let (what, separator) = if self.made.is_some() {
-                ("improving", ", ")
-            } else {
-                ("fine-tuning", "")
+            let what = match live {
+                None => "fine-tuning",
+                Some(true) => "preview live, fine-tuning",
+                Some(false) => "avatar live, improving",
             };
             return format!(
-                "{live}{separator}{what} {}/{}, {:.1} mm held out, {:.0} s left",
+                "{what} {}/{}, {:.1} mm held out, {:.0} s left",
                 now.step,
                 now.steps,
                 now.held_out_residual_m * 1e3,
                 now.left_secs
             );
         }
-        match (self.made.is_some(), self.gave_up) {
-            (true, _) => live.to_owned(),
-            (false, true) => "no avatar".to_owned(),
-            (false, false) => format!(
+        match (live, self.gave_up) {
+            (Some(false), _) => "avatar live".to_owned(),
+            (Some(true), _) => "preview live".to_owned(),
+            (None, true) => "no avatar".to_owned(),
+            (None, false) => format!(
                 "keyframes {}/{}",
                 self.keyframe_count(),
                 self.keyframes_wanted()
@@ -302,7 +301,7 @@ impl AvatarStage {
             let keyframes = making.keyframes.clone();
             self.learned_from.extend(&keyframes);
             self.preview = Some((Arc::clone(driver.avatar()), figures));
-            self.made = Some(Made { driver, frames_driven: 0, keyframes });
+            self.made = Some(Made { driver, is_preview: true, frames_driven: 0, keyframes });
         }
     }
 
@@ -318,7 +317,7 @@ impl AvatarStage {
         let FinishedAvatar { driver, figures } = finished?;
         self.learned_from.extend(&keyframes);
         self.figures.push(figures);
-        self.made = Some(Made { driver, frames_driven: 0, keyframes });
+        self.made = Some(Made { driver, is_preview: false, frames_driven: 0, keyframes });
         Ok(())
     }
 }

@@ -9,7 +9,7 @@ use rand::{SeedableRng as _, rngs::StdRng};
 use super::{FineTuneConfig, FineTuner, SamplingConfig, fine_tune, sampling::random_in_box};
 use crate::{
     AvatarError, CanonicalSamples, PoseInput, SignedDistanceField as _,
-    hyper::{HeadKind, HyperConfig, HyperNetwork},
+    hyper::{HeadKind, HyperConfig, HyperNetwork, RateConfig},
     nn::{Threads, ThreadsConfig},
     sdf::{SirenConfig, SirenField},
 };
@@ -57,7 +57,7 @@ fn config() -> FineTuneConfig {
             uniform: 64,
             ..Default::default()
         },
-        rates: crate::hyper::RateConfig { field: 2e-3, ..Default::default() },
+        rates: RateConfig { field: 2e-3, ..RateConfig::everything() },
         ..FineTuneConfig::default()
     }
 }

@@ -122,7 +122,7 @@ impl Default for JointConfig {
                 field: 3e-4,
                 static_share: 0.3,
                 trunk: 5e-5,
-                ..RateConfig::default()
+                ..RateConfig::everything()
             },
             decay_share: 0.5,
         }
@@ -154,7 +154,7 @@ impl Default for AdaptConfig {
             people: 1,
             frames: 8,
             inner_steps: 24,
-            inner_rates: RateConfig { field: 4e-4, ..RateConfig::default() },
+            inner_rates: RateConfig { field: 4e-4, ..RateConfig::everything() },
             inner_decay_share: 0.5,
         }
     }

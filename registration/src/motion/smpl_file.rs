@@ -25,6 +25,9 @@ pub const DEFAULT_RATE_HZ: f32 = 30.0;
 /// Pelvis, legs, spine, head and arms; SMPL-H and SMPL-X have fingers after them.
 const BODY_JOINTS: usize = 22;
 
+/// Nobody turned or went this far, in radians or metres.
+const FARTHEST: f32 = 1e4;
+
 /// Poses as a file has them, in its own axes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SmplFile {
@@ -42,10 +45,23 @@ impl SmplFile {
         let is_csv = path
             .extension()
             .is_some_and(|extension| extension.eq_ignore_ascii_case("csv"));
-        if is_csv {
-            Self::read_csv(path)
+        let file = if is_csv {
+            Self::read_csv(path)?
         } else {
-            Self::read_npz(path)
+            Self::read_npz(path)?
+        };
+        let far = |point: &Vec3| !point.is_finite() || point.abs().max_element() > FARTHEST;
+        let bad = |frame: usize| {
+            file.poses[frame].iter().any(far) || file.trans.get(frame).is_some_and(far)
+        };
+        match (0..file.poses.len()).find(|&frame| bad(frame)) {
+            Some(frame) => {
+                let expected =
+                    format!("angles and translations between {FARTHEST} and its negative");
+                let found = format!("a number beyond in frame {frame}");
+                Err(wrong(path, 0, &expected, found))
+            }
+            None => Ok(file),
         }
     }
 
@@ -158,10 +174,14 @@ impl SmplFile {
             trans: Vec::new(),
             betas: None,
         };
-        for (index, line) in text.lines().enumerate() {
+        for (index, line) in text.trim_end().lines().enumerate() {
             let cells: Vec<&str> = line.split(',').map(str::trim).collect();
-            if line.trim().is_empty() || (index == 0 && is_header(&cells)) {
+            if index == 0 && is_header(&cells) {
                 continue;
+            }
+            if line.trim().is_empty() {
+                let expected = "a row of numbers";
+                return Err(wrong(path, index + 1, expected, "an empty row".to_owned()));
             }
             let numbers = row(path, index + 1, &cells)?;
             if file.poses.len() >= MAX_FRAMES {

@@ -96,7 +96,7 @@ fn broken_files_are_told_where_and_what() {
         (
             ASF.replace("root upper\n", "\n"),
             AMC.to_owned(),
-            "small.asf, line 0",
+            "small.asf: expected",
             "no bones",
         ),
         (

@@ -66,8 +66,18 @@ fn rows_with_holes_or_words_are_named_by_line_and_column() {
         ("1,2,3\n4,5,6\n".to_owned(), "line 1", "72 cells"),
         (
             csv(|_, _| "0".into()).lines().next().unwrap().to_owned(),
-            "line 0",
+            ".csv: expected",
             "rows of 72",
+        ),
+        (
+            csv(|r, _| if r == 0 { "0".into() } else { "1e9".into() }),
+            "frame 1",
+            "beyond",
+        ),
+        (
+            csv(|_, _| "0".into()).replacen('\n', "\n\n", 2),
+            "line 2",
+            "an empty row",
         ),
     ];
     for (i, (text, place, what)) in cases.into_iter().enumerate() {

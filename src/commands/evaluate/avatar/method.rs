@@ -288,11 +288,13 @@ fn tuning(job: &Job, frames: usize, live: &FineTuneConfig) -> FineTuneConfig {
     match (job.method, job.data) {
         (Method::Oracle, _) => {
             tuning.steps *= ORACLE_STEPS_FACTOR;
+            tuning.rates = RateConfig { field: live.rates.field, ..RateConfig::everything() };
             tuning.frames_per_step = FRAMES_PER_STEP;
         }
         (_, Data::Percent(_)) if frames > FRAMES_PER_STEP => {
             tuning.steps *= MOST_STEPS_FACTOR.min((frames / FRAMES_PER_STEP) as u32);
             tuning.frames_per_step = FRAMES_PER_STEP;
+            tuning.rates = RateConfig { field: live.rates.field, ..RateConfig::of_poses(frames) };
         }
         _ => {}
     }

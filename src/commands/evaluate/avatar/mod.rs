@@ -113,8 +113,10 @@ struct Evaluation<'a> {
 impl Evaluation<'_> {
     fn people(&mut self, people: &[Entries]) -> anyhow::Result<()> {
         let mut jobs = jobs(self.args.tables(), self.args.quick);
-        let methods = &self.args.methods;
+        let Self { args, .. } = self;
+        let methods = &args.methods;
         jobs.retain(|job| methods.is_empty() || methods.contains(&job.method));
+        jobs.retain(|job| job.seed <= args.seeds);
         let progress = Progress::new("evaluating", Some((people.len() * jobs.len()) as u64));
         let mut done = 0;
         for entries in people {

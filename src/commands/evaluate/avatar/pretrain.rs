@@ -76,6 +76,7 @@ fn teach(
         steps: live.steps * STEPS_FACTOR,
         frames_per_step: FRAMES_PER_STEP,
         held_out_share: 0.0,
+        rates: RateConfig::everything(),
         ..*live
     };
     if let Some(architecture) = architecture(method) {
