@@ -125,6 +125,30 @@ fn steps_over_some_keyframes_at_a_time_learn_all_of_them() {
 }
 
 #[test]
+fn few_poses_say_little_about_what_poses_do() {
+    let moved = |rates: RateConfig| {
+        let rates = RateConfig { field: 2e-3, ..rates };
+        let network = learned(&FineTuneConfig { rates, ..config() });
+        let values = [0.0, 1.0].map(|bend_rad| {
+            let mut value = [0.0];
+            network
+                .field(&pose(bend_rad))
+                .values(&[Vec3::X * 0.5], &mut value);
+            value[0]
+        });
+        (values[0] - values[1]).abs()
+    };
+    let (few, many) = (
+        moved(RateConfig::of_poses(8)),
+        moved(RateConfig::of_poses(128)),
+    );
+    println!("the surface moves by {few} of {many}");
+    assert!(few < 0.5 * many, "{few} {many}");
+    assert_eq!(RateConfig::of_poses(500), RateConfig::everything());
+    assert_eq!(RateConfig::default(), RateConfig::of_poses(8));
+}
+
+#[test]
 fn points_of_weight_zero_are_never_drawn() {
     let mut spoiled = keyframes();
     for samples in &mut spoiled {
