@@ -330,7 +330,13 @@ impl Work {
     /// A preview is driven by its map, whatever that is worth: the field would take the time that fine-tuning needs.
     fn map_of_preview(&self) -> MapConfig {
         let poses_a_motion = self.settings.preview.poses_a_motion;
-        MapConfig { poses_a_motion, most_p95_mm: f32::INFINITY, ..self.settings.map }
+        let whatever = f32::INFINITY;
+        MapConfig {
+            poses_a_motion,
+            most_p95_mm: whatever,
+            farthest: whatever,
+            ..self.settings.map
+        }
     }
 
     /// Without a preview one waits a little longer, no more.
