@@ -331,12 +331,7 @@ impl Work {
     fn map_of_preview(&self) -> MapConfig {
         let poses_a_motion = self.settings.preview.poses_a_motion;
         let whatever = f32::INFINITY;
-        MapConfig {
-            poses_a_motion,
-            most_p95_mm: whatever,
-            farthest: whatever,
-            ..self.settings.map
-        }
+        MapConfig { poses_a_motion, most_p95_mm: whatever, farthest: whatever, ..self.settings.map }
     }
 
     /// Without a preview one waits a little longer, no more.
