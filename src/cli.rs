@@ -10,7 +10,7 @@ use serde::de::{DeserializeOwned, IntoDeserializer as _, value};
 use crate::{
     commands::{
         bench::Part,
-        evaluate::{Method, Table},
+        evaluate::{HEADLINE_SEEDS, Method, Table},
     },
     pipeline::settings::MOST_KEYFRAMES,
 };
@@ -497,7 +497,7 @@ pub(crate) struct EvaluateAvatarArgs {
     #[arg(long, value_name = "METHOD", value_delimiter = ',', value_parser = kebab::<Method>)]
     pub(crate) methods: Vec<Method>,
     /// Seeds of our rows in the few-shot table
-    #[arg(long, default_value_t = 3, value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(long, default_value_t = HEADLINE_SEEDS, value_parser = clap::value_parser!(u64).range(1..=HEADLINE_SEEDS))]
     pub(crate) seeds: u64,
     /// Every test person in every outfit, not only the four of the tables
     #[arg(long)]

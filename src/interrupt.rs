@@ -3,6 +3,7 @@
 use std::{
     error::Error,
     fmt,
+    path::Path,
     sync::atomic::{AtomicBool, Ordering},
 };
 
@@ -26,7 +27,19 @@ pub(crate) fn install() -> anyhow::Result<()> {
 
 /// Ended in order by Ctrl-C before the work was done, and how to go on: what follows in a script must not start.
 #[derive(Debug)]
-pub(crate) struct Stopped(pub(crate) String);
+pub(crate) struct Stopped(String);
+
+impl Stopped {
+    /// What is there is found by the same command.
+    pub(crate) fn on_the_way() -> Self {
+        Self("the same command goes on from here".to_owned())
+    }
+
+    /// What is there is found with `--resume`.
+    pub(crate) fn at_checkpoint(checkpoint: &Path) -> Self {
+        Self(format!("`--resume` goes on from {}", checkpoint.display()))
+    }
+}
 
 impl fmt::Display for Stopped {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

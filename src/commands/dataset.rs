@@ -52,7 +52,7 @@ fn make_dataset(args: &DatasetMakeArgs) -> anyhow::Result<()> {
     let made = make(&plan, &builtin::body(), &args.out, &go_on)?;
     progress.finish();
     let Some(manifest) = made else {
-        return Err(Stopped("the same command goes on from here".to_owned()).into());
+        return Err(Stopped::on_the_way().into());
     };
     say!(
         "{}{}",
@@ -79,7 +79,7 @@ fn import(args: &ImportCapeArgs) -> anyhow::Result<()> {
     let imported = import_cape(&args.release, &body, &choice, &args.out, &go_on)?;
     progress.finish();
     let Some(manifest) = imported else {
-        return Err(Stopped("the same command goes on from here".to_owned()).into());
+        return Err(Stopped::on_the_way().into());
     };
     say!("{}", summary(&args.out, &manifest));
     Ok(())

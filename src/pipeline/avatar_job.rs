@@ -24,9 +24,7 @@ use effigy_capture::CameraModel;
 use effigy_registration::{
     BodyModel,
     motion::{Motion, RestBody, Routine},
-    smpl::JOINT_COUNT,
 };
-use glam::Vec3;
 
 use super::{clock::Clock, settings::Settings};
 use crate::{interrupt, machine::Machine};
@@ -267,17 +265,22 @@ impl Work {
             .filter_map(|keyframe| Some(canonicaliser.process(&keyframe.frame)?.0))
             .collect();
         let prior = self.settings.prior_network(self.body.identity)?;
-        let metres_per_unit = canonicaliser.subject().unit_box.metres_per_unit();
         let tuning_started = self.clock.secs();
-        let middle = samples[samples.len() / 2].theta;
+        let subject = canonicaliser.subject();
+        let motions = map_motions(&RestBody::of(&self.body, &subject.betas));
+        // Fine-tuning refuses to start without samples.
         let driver_of = |network: HyperNetwork, map: &MapConfig| {
-            self.driver_of(network, (&canonicaliser, &middle), map)
+            let skinning = &**canonicaliser.skinning();
+            let theta = &samples[samples.len() / 2].theta;
+            let topology = TopologyConfig::default();
+            let avatar = Avatar::new(subject, Arc::new(network), skinning, theta, &topology)?;
+            self.driver_of(Arc::new(avatar), &motions, map)
         };
         let mut last = FineTuneProgress::default();
         let network = fine_tune(
             prior,
             &samples,
-            metres_per_unit,
+            subject.unit_box.metres_per_unit(),
             &self.settings.fine_tune,
             &|| self.clock.secs(),
             &mut |now, network| {
@@ -302,22 +305,17 @@ impl Work {
         Ok(FinishedAvatar { driver, figures })
     }
 
-    /// What drives an avatar with this network, and how far its map is from the field if it has one: only what is near
-    /// enough drives without the field.
+    /// What drives an avatar, and how far its map is from the field if it has one: only what is near enough drives
+    /// without the field.
     fn driver_of(
         &self,
-        network: HyperNetwork,
-        (canonicaliser, theta): (&Canonicaliser, &[Vec3; JOINT_COUNT]),
+        avatar: Arc<Avatar>,
+        motions: &[Motion],
         map: &MapConfig,
     ) -> anyhow::Result<(Driver, Option<f32>)> {
-        let subject = canonicaliser.subject();
-        let skinning = &**canonicaliser.skinning();
-        let topology = TopologyConfig::default();
-        let avatar = Avatar::new(subject, Arc::new(network), skinning, theta, &topology)?;
-        let mut driver = Driver::new(Arc::new(avatar), DriveConfig::default());
-        let motions = map_motions(&RestBody::of(&self.body, &subject.betas));
+        let mut driver = Driver::new(avatar, DriveConfig::default());
         let go_on = &mut || !self.cancel.load(Ordering::Relaxed);
-        let learned = ShapeMap::learn(&mut driver, &motions, map, go_on)?;
+        let learned = ShapeMap::learn(&mut driver, motions, map, go_on)?;
         let near = learned.filter(|learned| learned.error.p95_mm <= map.most_p95_mm);
         let p95_mm = near.as_ref().map(|near| near.error.p95_mm);
         let driver = match near {

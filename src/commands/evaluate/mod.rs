@@ -8,7 +8,7 @@ use anyhow::bail;
 use effigy_registration::smpl::builtin;
 use serde::Serialize;
 
-pub(crate) use self::avatar::{Method, Table};
+pub(crate) use self::avatar::{HEADLINE_SEEDS, Method, Table};
 use self::tracking::Suite;
 use crate::{
     cli::{EvaluateArgs, EvaluateTrackingArgs, EvaluateWhat, Protocol},

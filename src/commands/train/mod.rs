@@ -146,8 +146,7 @@ impl<'a> Job<'a> {
     ) -> anyhow::Result<()> {
         let checkpoint = self.args.checkpoint();
         let Some(mut network) = trained else {
-            let how = format!("`--resume` goes on from {}", checkpoint.display());
-            return Err(Stopped(how).into());
+            return Err(Stopped::at_checkpoint(&checkpoint).into());
         };
         let data = &self.people.described;
         network.provenance = Provenance {

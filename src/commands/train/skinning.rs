@@ -79,8 +79,7 @@ pub(crate) fn run(args: &TrainSkinningArgs) -> anyhow::Result<()> {
     };
     let trained = train_skinning(&body, &clouds, &config, Some(&checkpoint), &mut on_progress)?;
     let Some((mut networks, looks)) = trained else {
-        let how = format!("`--resume` goes on from {}", checkpoint.display());
-        return Err(Stopped(how).into());
+        return Err(Stopped::at_checkpoint(&checkpoint).into());
     };
     networks.provenance.training = format!(
         "effigy train skinning --preset live --seed {} ({} steps), data set of seed {}",

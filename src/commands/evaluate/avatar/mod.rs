@@ -30,7 +30,7 @@ use self::{
     subject::{Entries, Subject, chosen},
 };
 pub(crate) use self::{
-    plan::{Camera, Method, Table},
+    plan::{Camera, HEADLINE_SEEDS, Method, Table},
     subject::Lesson,
     views::Views,
 };
@@ -112,8 +112,8 @@ struct Evaluation<'a> {
 
 impl Evaluation<'_> {
     fn people(&mut self, people: &[Entries]) -> anyhow::Result<()> {
-        let mut jobs = jobs(self.args.tables(), self.args.quick);
-        let Self { args, .. } = self;
+        let args = self.args;
+        let mut jobs = jobs(args.tables(), args.quick);
         let methods = &args.methods;
         jobs.retain(|job| methods.is_empty() || methods.contains(&job.method));
         jobs.retain(|job| job.seed <= args.seeds);

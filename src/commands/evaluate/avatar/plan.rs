@@ -4,7 +4,7 @@ use effigy_sim_sensor::SensorPreset;
 use serde::{Deserialize, Serialize};
 
 /// Seeds of the headline row.
-const HEADLINE_SEEDS: u64 = 3;
+pub(crate) const HEADLINE_SEEDS: u64 = 3;
 
 /// A part of the evaluation that can be run by itself.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]

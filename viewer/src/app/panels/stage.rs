@@ -17,7 +17,7 @@ fn title(ui: &Ui, area: Rect, snapshot: &Snapshot) {
         (Some(avatar), _) => ("Avatar", format!("frame {}", avatar.id.0)),
         (None, Some(_)) => (
             "Fitted body",
-            "the avatar appears after fine-tuning".to_owned(),
+            "an avatar appears when there are enough keyframes".to_owned(),
         ),
         (None, None) => ("Avatar", "nobody found yet".to_owned()),
     };
