@@ -9,6 +9,10 @@ use super::sheet::{NONE, Sheet};
 /// How far around a point surfaces are looked for: deeper than cloth ever gets between two looks.
 pub(super) const REACH_M: f32 = 0.035;
 
+/// The furthest that skin pushes out in one step what is inside. Where limbs run into each other, the nearest surface
+/// is another one from one moment to the next; a push all the way would tear the garment.
+const DEPENETRATION_M: f32 = 0.004;
+
 /// A triangle mesh at the end of a step, and where it was at the step's start.
 #[derive(Clone, Debug)]
 pub(super) struct Collider {
@@ -45,7 +49,7 @@ pub(super) struct Obstacle<'a> {
     pub(super) thickness_m: f32,
     /// What is further inside than this is left alone: thin cloth has an inside for no more than that.
     pub(super) deepest_m: f32,
-    /// The furthest a point is pushed out in one step.
+    /// The furthest a point is pushed out in one step, beyond what the surface itself moves.
     pub(super) push_m: f32,
     /// The garment's number, if it is one.
     pub(super) layer: Option<usize>,
@@ -122,7 +126,7 @@ impl<'a> Obstacle<'a> {
             collider,
             thickness_m,
             deepest_m: REACH_M,
-            push_m: REACH_M,
+            push_m: DEPENETRATION_M,
             layer: None,
             sleeve: None,
         }

@@ -105,3 +105,37 @@ fn cloth_that_falls_on_a_table_comes_to_rest_on_it_and_is_no_longer_than_it_was(
     let worst = cloth.strains().map(f32::abs).fold(0.0, f32::max);
     assert!(worst < 0.01, "an edge has changed by {worst}");
 }
+
+/// Where limbs run into each other cloth is inside of something at times. Out at once, as it used to be, 2 cm are 7 m/s.
+#[test]
+fn cloth_comes_out_of_a_surface_step_by_step_and_keeps_up_with_one_that_moves() {
+    let table = square(9, 0.25, Quat::IDENTITY, 0.0);
+    let mut still = Collider::new(&table);
+    let mut cloth = napkin(fabric(0.2, 2.0), Quat::IDENTITY, -0.02);
+    cloth.forget_searches(1);
+    let mut heights_m = vec![-0.02];
+    for _ in 0..12 {
+        cloth.step(STEP_SECS, 4, &[Obstacle::body(&still, SKIN_M)]);
+        heights_m.push(middle(&cloth).y);
+    }
+    let furthest_m = heights_m
+        .windows(2)
+        .map(|two| two[1] - two[0])
+        .fold(0.0, f32::max);
+    assert!(furthest_m < 0.006, "{furthest_m} m in one step");
+    assert!(
+        (heights_m[12] - SKIN_M).abs() < 1e-3,
+        "out in 12 steps: {heights_m:?}"
+    );
+    let mut lift_m = 0.0;
+    for _ in 0..12 {
+        lift_m += 0.006;
+        still.advance(table.points.iter().map(|&point| point + Vec3::Y * lift_m));
+        cloth.step(STEP_SECS, 4, &[Obstacle::body(&still, SKIN_M)]);
+    }
+    let above_m = middle(&cloth).y - lift_m;
+    assert!(
+        (above_m - SKIN_M).abs() < 1e-3,
+        "a table that rises fast carries it: {above_m} m"
+    );
+}

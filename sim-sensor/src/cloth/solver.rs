@@ -288,10 +288,11 @@ impl Cloth {
                     _ => obstacle.push_m,
                 };
                 let out_m = touch.normal.dot(touch.point) + obstacle.thickness_m;
+                let carried_m = touch.normal.dot(touch.moved).max(0.0);
                 self.contacts.push(Contact {
                     point: v as u32,
                     normal: touch.normal,
-                    offset_m: out_m.min(touch.normal.dot(point) + push_m),
+                    offset_m: out_m.min(touch.normal.dot(point) + carried_m + push_m),
                     moved: touch.moved,
                     pushed_m: 0.0,
                     layer: obstacle.layer,

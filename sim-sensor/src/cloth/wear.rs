@@ -9,7 +9,7 @@ use effigy_registration::{
 use glam::{Quat, Vec3};
 
 use super::{
-    collider::{Arm, Collider, Obstacle, Part},
+    collider::{Arm, Collider, Obstacle, Part, REACH_M},
     form::{Form, cut_pose},
     let_out::{let_out, trials},
     pattern::ClothKind,
@@ -366,7 +366,10 @@ impl Wear {
     /// Removes what little the last step left inside of something.
     fn finish(&mut self) {
         for number in 0..self.cloths.len() {
-            let skin = skin(&self.arms, &self.body, 0.7 * self.config.skin_m);
+            let mut skin = skin(&self.arms, &self.body, 0.7 * self.config.skin_m);
+            for obstacle in &mut skin {
+                obstacle.push_m = REACH_M;
+            }
             self.cloths[number].push_out(&skin);
             let points = self.cloths[number].points.clone();
             self.layers[number].place(&points);

@@ -7,17 +7,20 @@ use super::{form::Form, pattern::Pattern, sheet::Sheet};
 
 /// Rounds of diffusion for cloth on the body, and for what hangs free.
 const ROUNDS: usize = 12;
-const HANGING_ROUNDS: usize = 120;
+const HANGING_ROUNDS: usize = 300;
+/// Around the hips, up to this far above their joints, shirts bend with what hangs from them.
+const ABOVE_HIPS_M: f32 = 0.12;
 
 /// Weights for each point of a garment in the form's pose.
 pub(super) fn diffused(form: &Form, sheet: &Sheet, pattern: &Pattern) -> Vec<VertexWeights> {
     let hangs = pattern.hem.is_some();
     let seam_m = super::cut::seam_height_m(form);
     let mut shares: Vec<[f32; JOINT_COUNT]> = Vec::with_capacity(sheet.points.len());
+    let bends_below_m = form.leg_height_m(0.0) + ABOVE_HIPS_M;
     let mut hanging = Vec::with_capacity(sheet.points.len());
     for &point in &sheet.points {
         let below = hangs && point.y < seam_m + 0.02 && form.trunk_side(point);
-        hanging.push(below);
+        hanging.push(hangs && point.y < bends_below_m && form.trunk_side(point));
         shares.push(form.bone_shares(point, below));
     }
     let neighbours = sheet.neighbours();

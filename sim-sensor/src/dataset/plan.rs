@@ -86,7 +86,7 @@ pub struct DatasetPlan {
 }
 
 /// Goes up whenever the same plan comes to other people, movements or clothes: what an earlier one made is made again.
-pub const GENERATOR: u32 = 3;
+pub const GENERATOR: u32 = 4;
 
 #[expect(
     clippy::trivially_copy_pass_by_ref,

@@ -92,7 +92,7 @@ pub(super) fn ballerina_spin(at: Moment, style: &Style, rest: &RestBody, stance:
     stance.feet[0].pitch_rad += 0.38 * lifted;
     let foot = &mut stance.feet[1];
     let beside = foot.ball_m - standing;
-    let at_knee = vec2(-0.09, 0.09);
+    let at_knee = vec2(-0.12, 0.09);
     foot.ball_m = standing + turned(beside.lerp(at_knee, lifted));
     foot.lift_m += 0.42 * leg_m * lifted;
     foot.yaw_rad = heading_rad - toe_out_rad - 0.55 * lifted;
