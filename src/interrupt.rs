@@ -35,6 +35,11 @@ impl Stopped {
         Self("the same command goes on from here".to_owned())
     }
 
+    /// What was done till then was printed and written.
+    pub(crate) fn early() -> Self {
+        Self("the table holds what was done till then".to_owned())
+    }
+
     /// What is there is found with `--resume`.
     pub(crate) fn at_checkpoint(checkpoint: &Path) -> Self {
         Self(format!("`--resume` goes on from {}", checkpoint.display()))

@@ -70,7 +70,15 @@ fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Export(args) => commands::export::run(&args),
         Command::Dataset(args) => commands::dataset::run(&args),
         Command::Train(args) => commands::train::run(&args),
-        Command::Evaluate(args) => commands::evaluate::run(&args),
-        Command::Bench(args) => commands::bench::run(&args),
+        Command::Evaluate(args) => commands::evaluate::run(&args).and_then(|()| whole()),
+        Command::Bench(args) => commands::bench::run(&args).and_then(|()| whole()),
     }
+}
+
+/// Tables that Ctrl-C cut short are printed, but nobody shall take them for whole ones.
+fn whole() -> anyhow::Result<()> {
+    if interrupt::requested() {
+        return Err(interrupt::Stopped::early().into());
+    }
+    Ok(())
 }

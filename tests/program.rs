@@ -8,6 +8,8 @@ use std::{
     iter,
     path::Path,
     process::{Command, Output, Stdio},
+    thread,
+    time::Duration,
 };
 
 use image::{ImageBuffer, Luma};
@@ -15,6 +17,8 @@ use zip::{ZipWriter, write::SimpleFileOptions};
 
 /// Of clap: what was typed makes no sense.
 const USAGE: i32 = 2;
+/// Of the shell: ended by an interrupt.
+const STOPPED: i32 = 130;
 /// Of `main`: what was typed made sense, but the data did not.
 const DATA: i32 = 1;
 
@@ -311,6 +315,27 @@ fn ctrl_c_ends_a_run_in_order_even_while_it_waits_for_an_avatar() {
 }
 
 #[test]
+fn figures_that_ctrl_c_cut_short_are_printed_and_not_called_whole() {
+    let folder = tempfile::tempdir().unwrap();
+    let arguments = ["bench", "--quick", "--only", "field,drive,fusion"];
+    let run = Command::new(env!("CARGO_BIN_EXE_effigy"))
+        .current_dir(folder.path())
+        .args(arguments)
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    // Long enough to have begun, far too short to be done.
+    thread::sleep(Duration::from_millis(300));
+    let id = run.id().to_string();
+    let told = Command::new("kill").args(["-INT", &id]).status().unwrap();
+    assert!(told.success());
+    let output = run.wait_with_output().unwrap();
+    assert_fails(&output, STOPPED, &["stopped", "till then"]);
+    assert!(String::from_utf8_lossy(&output.stdout).contains("| what | value |"));
+}
+
+#[test]
 fn a_live_run_that_was_recorded_repeats_itself() {
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
@@ -351,6 +376,49 @@ fn a_replay_repeats_when_the_avatar_took_over_not_when_it_would_have() {
     assert!((1..90).contains(&first.len()), "{} meshes", first.len());
     assert!(first == meshes(here, "again"), "meshes differ");
     assert!(poses(here, "soon") == poses(here, "again"), "poses differ");
+}
+
+#[test]
+fn smoothing_calms_what_is_driven_not_what_is_tracked_and_a_preview_changes_no_avatar() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    simulate(here, "s.mcap", "3");
+    const SOON: &str = "[schedule]\nswap_after_frames = 10\npreview_after_frames = 4\n";
+    let smooth = "smooth = { one_euro = { rest_cutoff_hz = 0.1 } }\n";
+    let replay = |name: &str, smooth: &str, preview_steps: u32| {
+        let config = format!("{smooth}{QUICK}{SOON}[preview]\nsteps = {preview_steps}\n");
+        fs::write(here.join("config.toml"), config).unwrap();
+        run(here, &["replay", "s.mcap", "--config", "config.toml"], name);
+    };
+    replay("plain", "", 0);
+    replay("smooth", smooth, 0);
+    replay("preview", "", 2);
+    assert!(
+        poses(here, "plain") == poses(here, "smooth"),
+        "poses differ"
+    );
+    let (plain, smooth) = (meshes(here, "plain"), meshes(here, "smooth"));
+    assert!(!plain.is_empty() && plain.keys().eq(smooth.keys()));
+    assert!(plain != smooth, "smoothing drives nothing");
+    let shown = meshes(here, "preview");
+    assert!(shown.len() > plain.len(), "a preview is shown before");
+    for (name, mesh) in &plain {
+        assert!(shown[name] == *mesh, "{name:?} differs after a preview");
+    }
+}
+
+#[test]
+fn keyframes_without_a_point_near_the_body_are_an_error_that_says_so() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    simulate(here, "s.mcap", "2");
+    let config = format!("{QUICK}[canonicalise]\nmax_distance_to_body_m = 1e-7\n");
+    fs::write(here.join("near.toml"), config).unwrap();
+    let arguments = ["replay", "s.mcap", "--headless", "--keyframes", "2"];
+    let files = ["--config", "near.toml", "--out", "out"];
+    let output = effigy(here, &[&arguments[..], &files].concat());
+    println!("{}", String::from_utf8_lossy(&output.stderr));
+    assert_fails(&output, DATA, &["keyframe"]);
 }
 
 #[test]

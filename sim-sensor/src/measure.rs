@@ -161,6 +161,12 @@ fn source_sigma_m(preset: SensorPreset, view: &View, pixel: usize) -> f64 {
     }
 }
 
+/// What two matching windows of 7 px share, this many columns apart: the correlation of a moving mean of white noise.
+pub fn window_correlation(lag: usize) -> f64 {
+    const WINDOW_PX: f64 = 7.0;
+    (1.0 - lag as f64 / WINDOW_PX).max(0.0)
+}
+
 /// Correlation of errors on a frontal wall between pixels of a row, this many columns apart.
 pub fn correlation(preset: SensorPreset, depth_m: f32, lags: &[usize], frames: u64) -> Vec<f64> {
     let view = wall(preset.intrinsics(), depth_m, 0.0);

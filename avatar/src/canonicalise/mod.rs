@@ -9,8 +9,8 @@ mod unpose;
 use std::{path::PathBuf, sync::Arc};
 
 use effigy_capture::CameraModel;
-use effigy_fusion::{CleanFrame, maps::Rays};
-use effigy_registration::{BodyModel, BodyParams, RegisteredFrame};
+use effigy_fusion::{CleanFrame, maps::Rays, mesh::sample::SurfaceSample};
+use effigy_registration::{BodyModel, BodyParams, PosedBody, RegisteredFrame};
 use glam::Vec3;
 use rand::{RngExt as _, SeedableRng as _, rngs::StdRng};
 use serde::{Deserialize, Serialize};
@@ -208,17 +208,8 @@ impl Canonicaliser {
         let mut counts = CanonicaliseCounts { observed: seen.points.len(), ..Default::default() };
         // A quarter more than wanted, since some will be dropped.
         let seen = seen.pick(self.config.points * 5 / 4, &mut rng);
-        let unposer = Unposer {
-            skinning: &*self.skinning,
-            posed: &posed,
-            warp: &warp,
-            refine_steps: self.config.refine_steps,
-        };
-        let (reach_m, margin_m) = (self.config.contact_reach_m, self.config.contact_margin_m);
-        let contacts = Contacts::new(&self.model, &posed.vertices, reach_m, margin_m);
-        let undecided = contacts.are_undecided(&seen.points);
-        let (points_in_unit, normals, weights) =
-            self.surface(&seen, &undecided, &unposer, &mut counts);
+        let unposer = self.unposer(&posed, &warp);
+        let (points_in_unit, normals, weights) = self.surface(&seen, &unposer, &mut counts);
 
         let free = free_space::points_in_world(frame, self.rays.as_ref(), &self.config, &mut rng);
         let free_in_unit = self.free(&free, &unposer);
@@ -232,6 +223,40 @@ impl Canonicaliser {
             free_in_unit,
         };
         Some((samples, counts))
+    }
+
+    /// Points of a surface that is known, not seen, in the pose of `params`: in world space, with unit normals. They
+    /// pass the tests of [`Self::process`] and all have weight one; there are no empty points.
+    pub fn process_surface(
+        &self,
+        params: &BodyParams,
+        surface: &[SurfaceSample],
+    ) -> (CanonicalSamples, CanonicaliseCounts) {
+        let params = BodyParams { betas: self.subject.betas, ..*params };
+        let posed = self.model.pose(&params);
+        let warp = Warp::new(&params, &self.subject.rest_joints);
+        let known = Observed {
+            points: surface.iter().map(|sample| sample.point).collect(),
+            normals: surface.iter().map(|sample| sample.normal).collect(),
+            weights: vec![1.0; surface.len()],
+        };
+        let mut counts = CanonicaliseCounts { observed: surface.len(), ..Default::default() };
+        let (points_in_unit, normals, weights) =
+            self.surface(&known, &self.unposer(&posed, &warp), &mut counts);
+        let samples = CanonicalSamples {
+            theta: params.theta,
+            pose: self.subject.pose_input(&params.theta),
+            points_in_unit,
+            normals,
+            weights,
+            free_in_unit: Vec::new(),
+        };
+        (samples, counts)
+    }
+
+    fn unposer<'a>(&'a self, posed: &'a PosedBody, warp: &'a Warp) -> Unposer<'a> {
+        let refine_steps = self.config.refine_steps;
+        Unposer { skinning: &*self.skinning, posed, warp, refine_steps }
     }
 
     /// As [`Self::process`], with the noise averaged over frames just before and after, each in its own pose.
@@ -301,15 +326,17 @@ impl Canonicaliser {
     fn surface(
         &self,
         seen: &Observed,
-        undecided: &[bool],
         unposer: &Unposer<'_>,
         counts: &mut CanonicaliseCounts,
     ) -> (Vec<Vec3>, Vec<Vec3>, Vec<f32>) {
+        let (reach_m, margin_m) = (self.config.contact_reach_m, self.config.contact_margin_m);
+        let contacts = Contacts::new(&self.model, &unposer.posed.vertices, reach_m, margin_m);
+        let undecided = contacts.are_undecided(&seen.points);
         let limit_m = self.config.max_distance_to_body_m;
         let returned = unposer.unpose(&seen.points, &seen.normals, limit_m);
         let (mut points, mut normals, mut weights) = (Vec::new(), Vec::new(), Vec::new());
         let judged = returned.iter().zip(&seen.weights).zip(undecided);
-        for ((point, &weight), &undecided) in judged {
+        for ((point, &weight), undecided) in judged {
             let in_unit = self.subject.unit_box.unit_from_canonical(point.canonical);
             if point.distance_to_body_m > limit_m {
                 counts.far_from_body += 1;

@@ -1,6 +1,8 @@
 //! Rendered people come back to where they were before they were posed.
 
-use effigy_fusion::mesh::{closest_point::ClosestPoint, normals::vertex_normals};
+use effigy_fusion::mesh::{
+    closest_point::ClosestPoint, normals::vertex_normals, sample::sample_surface,
+};
 
 use super::*;
 use crate::testing::{CAMERA, Suit, everyday_poses, standing};
@@ -98,6 +100,28 @@ fn free_points_lie_outside_in_canonical_space_too() {
             distances.len()
         );
     }
+}
+
+/// What is known of a surface lands where what is seen of it does.
+#[test]
+fn a_known_surface_lands_on_the_canonical_one_and_belongs_to_the_same_person() {
+    let suit = Suit::new(0.01);
+    let params = everyday_poses()[0];
+    let surface = sample_surface(&suit.in_world(&params), 3000, 1);
+    let canonicaliser = canonicaliser(&suit);
+    let (samples, counts) = canonicaliser.process_surface(&params, &surface);
+    let mut errors = signed_m(&suit, &samples, &samples.points_in_unit);
+    for error in &mut errors {
+        *error = error.abs();
+    }
+    errors.sort_by(f32::total_cmp);
+    let p95 = errors[errors.len() * 95 / 100];
+    println!("{counts:?}, p95 {p95} m");
+    assert!(counts.kept > 2700 && counts.observed == 3000, "{counts:?}");
+    assert!(p95 < 0.006, "p95 {p95}");
+    let (seen, _) = canonicaliser.process(&suit.frame(&params, 0)).unwrap();
+    assert_eq!((seen.theta, seen.pose), (samples.theta, samples.pose));
+    assert!(samples.weights.iter().all(|&weight| weight == 1.0));
 }
 
 /// The arm hangs 2 cm beside the torso: its points must stay the arm's.

@@ -35,7 +35,7 @@ impl Default for FineTuneConfig {
     fn default() -> Self {
         Self {
             seed: 1,
-            steps: 400,
+            steps: 150,
             frames_per_step: 0,
             warm_up_steps: 10,
             decay_share: 0.5,

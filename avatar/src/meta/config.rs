@@ -111,9 +111,9 @@ pub struct JointConfig {
 impl Default for JointConfig {
     fn default() -> Self {
         Self {
-            people: 64,
+            people: 150,
             frames: 16,
-            steps: 6000,
+            steps: 5000,
             people_per_step: 4,
             frames_per_person: 2,
             code_rate: 5e-3,

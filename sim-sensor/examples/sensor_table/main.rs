@@ -62,13 +62,18 @@ fn print_correlation() {
     const LAGS: [usize; 7] = [1, 2, 3, 4, 6, 8, 12];
     println!("\ncorrelation of errors along a row at 2 m");
     println!("| pixels apart | 1 | 2 | 3 | 4 | 6 | 8 | 12 |\n|---|---|---|---|---|---|---|---|");
+    let print_row = |name: &str, values: &[f64]| {
+        let values: Vec<String> = values.iter().map(|value| format!("{value:.2}")).collect();
+        println!("| {name} | {} |", values.join(" | "));
+    };
     for preset in SensorPreset::ALL {
-        print!("| {} |", preset.name());
-        for value in measure::correlation(preset, 2.021, &LAGS, 3) {
-            print!(" {value:.2} |");
-        }
-        println!();
+        print_row(
+            preset.name(),
+            &measure::correlation(preset, 2.021, &LAGS, 3),
+        );
     }
+    let windows = LAGS.map(measure::window_correlation);
+    print_row("windows of 7 px that overlap", &windows);
 }
 
 fn print_edges() {

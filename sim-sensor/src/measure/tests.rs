@@ -53,7 +53,10 @@ fn edges_grow_wobble_mix_and_cast_shadows_as_their_sensor_does() {
                     (edges.grown_px / 3.5 - 1.0).abs() < 0.15,
                     "{name}: {edges:?}"
                 );
-                assert!((left_px - expected_px).abs() < 1.5, "{name}: {edges:?}");
+                assert!(
+                    (left_px / expected_px - 1.0).abs() < 0.15,
+                    "{name}: {edges:?}"
+                );
                 assert!(right_px < 0.35 * left_px, "{name}: {edges:?}");
             }
             SensorPreset::Kinect => {
@@ -63,7 +66,10 @@ fn edges_grow_wobble_mix_and_cast_shadows_as_their_sensor_does() {
                     (edges.wobble_px / expected - 1.0).abs() < 0.15,
                     "{name}: {edges:?}"
                 );
-                assert!((left_px - expected_px).abs() < 1.5, "{name}: {edges:?}");
+                assert!(
+                    (left_px / expected_px - 1.0).abs() < 0.15,
+                    "{name}: {edges:?}"
+                );
             }
         }
     }

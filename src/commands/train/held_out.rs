@@ -64,7 +64,7 @@ impl Judge {
         let judged: Vec<usize> = places.iter().skip(1).step_by(2).copied().collect();
         let surfaces: Vec<PersonFrame> = judged
             .iter()
-            .map(|&frame| as_is(&frame_of(sequence, frame, subject), subject))
+            .map(|&frame| as_is(&frame_of(sequence, frame, &canonicaliser), subject))
             .collect();
         let first = judged
             .first()

@@ -192,7 +192,7 @@ fn people(args: &TrainShared, body: &Arc<BodyModel>) -> anyhow::Result<(People, 
             path.display()
         );
     }
-    let cloth = ClothPeople::load(&dataset, &teachers, body)?;
+    let cloth = ClothPeople::load(&dataset, &teachers, body, &settings.canonicalise)?;
     let manifest = dataset.manifest();
     let described = format!("data set {:?} of seed {}", manifest.preset, manifest.seed);
     Ok((

@@ -3,7 +3,8 @@
 use std::sync::Arc;
 
 use effigy_avatar::{
-    Subject,
+    Canonicaliser, Subject,
+    canonicalise::CanonicaliseConfig,
     meta::{Person, PersonFrame, PersonSource},
 };
 use effigy_fusion::{TriangleMesh, mesh::sample::sample_surface};
@@ -45,11 +46,12 @@ impl ClothPeople {
     pub(super) fn load(
         dataset: &Dataset,
         entries: &[&SequenceEntry],
-        body: &BodyModel,
+        body: &Arc<BodyModel>,
+        canonicalise: &CanonicaliseConfig,
     ) -> anyhow::Result<Self> {
         let people = entries
             .par_iter()
-            .map(|entry| learned(&dataset.load(entry)?, body))
+            .map(|entry| learned(&dataset.load(entry)?, body, canonicalise))
             .collect::<anyhow::Result<_>>()?;
         Ok(Self { people })
     }
@@ -60,26 +62,37 @@ impl ClothPeople {
     }
 }
 
-fn learned(sequence: &Sequence, body: &BodyModel) -> anyhow::Result<Learned> {
-    let subject = Subject::new(body, &sequence.betas)?;
+fn learned(
+    sequence: &Sequence,
+    body: &Arc<BodyModel>,
+    config: &CanonicaliseConfig,
+) -> anyhow::Result<Learned> {
+    let canonicaliser = Canonicaliser::new(Arc::clone(body), &sequence.betas, config.clone())?;
     let frames = 0..sequence.frames.len();
     Ok(Learned {
         frames: frames
-            .map(|frame| frame_of(sequence, frame, &subject))
+            .map(|frame| frame_of(sequence, frame, &canonicaliser))
             .collect(),
-        subject,
+        subject: *canonicaliser.subject(),
     })
 }
 
-/// A frame's whole surface.
-pub(super) fn frame_of(sequence: &Sequence, frame: usize, subject: &Subject) -> LearnedFrame {
+/// A frame's whole surface, brought to canonical space as keyframes are: what the pose does to that is part of what
+/// is to be learned.
+pub(super) fn frame_of(
+    sequence: &Sequence,
+    frame: usize,
+    canonicaliser: &Canonicaliser,
+) -> LearnedFrame {
+    let surface = sample_surface(&sequence.posed_mesh(frame), CLOTH_POINTS, frame as u64);
+    let (samples, _) = canonicaliser.process_surface(&sequence.params(frame), &surface);
     LearnedFrame {
-        theta: sequence.frames[frame].theta,
-        points: points_of(
-            &sequence.star_mesh(frame),
-            subject,
-            (CLOTH_POINTS, frame as u64),
-        ),
+        theta: samples.theta,
+        points: samples
+            .points_in_unit
+            .into_iter()
+            .zip(samples.normals)
+            .collect(),
     }
 }
 

@@ -31,16 +31,16 @@ use crate::{
 const ORACLE_POINTS: usize = 5000;
 
 /// The oracle may take its time.
-const ORACLE_STEPS_FACTOR: u32 = 6;
+const ORACLE_STEPS_FACTOR: u32 = 16;
 
 /// With more keyframes than this, each step learns from so many of them.
 const FRAMES_PER_STEP: usize = 8;
 
 /// More frames are seen as often each as eight are, but no more steps are taken than this many times the live chain's.
-const MOST_STEPS_FACTOR: u32 = 4;
+const MOST_STEPS_FACTOR: u32 = 10;
 
 /// Other people's ways take this many times our steps, each over half the keyframes; not timed yet.
-const BASELINE_STEPS_FACTOR: u32 = 4;
+const BASELINE_STEPS_FACTOR: u32 = 10;
 const BASELINE_FRAMES_PER_STEP: usize = 4;
 /// Adam's rates of networks that start from nothing, and of those that know people.
 const BASELINE_RATE: f32 = 5e-4;
@@ -328,33 +328,15 @@ pub(super) fn go_on() -> ControlFlow<()> {
     }
 }
 
-/// The true surfaces of the frames that are judged.
+/// The true surfaces of the frames that are judged, brought to canonical space as keyframes are.
 fn whole_surfaces(subject: &Subject, canonicaliser: &Canonicaliser) -> Vec<CanonicalSamples> {
-    let person = canonicaliser.subject();
     let tests = subject.tests.iter().zip(0..);
     tests
         .map(|(test, number)| {
-            let points = sample_surface(&test.truth_in_star, ORACLE_POINTS, number);
-            person_samples(person, &test.params.theta, &points)
+            let points = sample_surface(&test.truth, ORACLE_POINTS, number);
+            canonicaliser.process_surface(&test.params, &points).0
         })
         .collect()
-}
-
-/// A whole true surface as samples, each point of weight one.
-pub(super) fn person_samples(
-    person: &effigy_avatar::Subject,
-    theta: &[glam::Vec3; 24],
-    surface: &[effigy_fusion::mesh::sample::SurfaceSample],
-) -> CanonicalSamples {
-    let in_unit = |point| person.unit_box.unit_from_canonical(point);
-    CanonicalSamples {
-        theta: *theta,
-        pose: person.pose_input(theta),
-        points_in_unit: surface.iter().map(|sample| in_unit(sample.point)).collect(),
-        normals: surface.iter().map(|sample| sample.normal).collect(),
-        weights: vec![1.0; surface.len()],
-        free_in_unit: Vec::new(),
-    }
 }
 
 /// A network that is always given the same pose.

@@ -4,8 +4,9 @@
 use std::sync::Arc;
 
 use effigy_avatar::{
-    CanonicalSamples, Subject as Person,
+    CanonicalSamples, Canonicaliser,
     baselines::{Architecture, ConditionedField, fit},
+    canonicalise::CanonicaliseConfig,
     fine_tune::{FineTuneConfig, fine_tune},
     hyper::{HyperNetwork, RateConfig},
 };
@@ -13,10 +14,7 @@ use effigy_fusion::mesh::sample::sample_surface;
 use effigy_registration::BodyModel;
 use effigy_sim_sensor::dataset::{Dataset, Split};
 
-use super::{
-    method::{go_on, person_samples},
-    plan::Method,
-};
+use super::{method::go_on, plan::Method};
 use crate::pipeline::{clock::Clock, evaluate::evenly_placed, settings::Settings};
 
 /// Frames of each training sequence, and points of each.
@@ -25,9 +23,9 @@ const POINTS: usize = 4000;
 /// Frames a step.
 const FRAMES_PER_STEP: usize = 4;
 /// Steps of a hypernetwork, which starts from the prior's `phi*`, in fine-tunings.
-const STEPS_FACTOR: u32 = 4;
+const STEPS_FACTOR: u32 = 11;
 /// The others start from nothing and get twice as many (as in the paper, whose epochs were 100 to 50).
-const STEPS_FACTOR_FROM_NOTHING: u32 = 8;
+const STEPS_FACTOR_FROM_NOTHING: u32 = 22;
 /// Adam's rate of the networks that start from nothing.
 const RATE_FROM_NOTHING: f32 = 5e-4;
 
@@ -57,7 +55,7 @@ impl School {
             return Ok(network.clone());
         }
         if self.samples.is_empty() {
-            self.samples = training_people(dataset, body)?;
+            self.samples = training_people(dataset, body, &settings.canonicalise)?;
         }
         let prior = settings.prior_network(body.identity)?;
         let network = teach(method, &self.samples, (&prior, &settings.fine_tune), clock)?;
@@ -108,21 +106,21 @@ fn architecture(method: Method) -> Option<Architecture> {
     }
 }
 
-/// Whole true surfaces of the training people.
-fn training_people(dataset: &Dataset, body: &BodyModel) -> anyhow::Result<Vec<CanonicalSamples>> {
+/// Whole true surfaces of the training people, brought to canonical space as keyframes are.
+fn training_people(
+    dataset: &Dataset,
+    body: &Arc<BodyModel>,
+    config: &CanonicaliseConfig,
+) -> anyhow::Result<Vec<CanonicalSamples>> {
     let mut samples = Vec::new();
     let entries = dataset.manifest().sequences.iter();
     for entry in entries.filter(|entry| entry.plan.split == Split::Train) {
         let sequence = dataset.load(entry)?;
-        let person = Person::new(body, &sequence.betas)?;
+        let person = Canonicaliser::new(Arc::clone(body), &sequence.betas, config.clone())?;
         for frame in evenly_placed(sequence.frames.len(), FRAMES) {
             let seed = samples.len() as u64;
-            let points = sample_surface(&sequence.star_mesh(frame), POINTS, seed);
-            samples.push(person_samples(
-                &person,
-                &sequence.frames[frame].theta,
-                &points,
-            ));
+            let points = sample_surface(&sequence.posed_mesh(frame), POINTS, seed);
+            samples.push(person.process_surface(&sequence.params(frame), &points).0);
         }
     }
     Ok(samples)

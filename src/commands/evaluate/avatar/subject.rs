@@ -39,7 +39,6 @@ pub(super) struct TestFrame {
     pub(super) task: Task,
     pub(super) params: BodyParams,
     pub(super) truth: TriangleMesh,
-    pub(super) truth_in_star: TriangleMesh,
     /// Which truth vertices count (MetaAvatar's mask).
     pub(super) measured: Vec<bool>,
 }
@@ -172,7 +171,6 @@ impl TestFrame {
             task,
             params: sequence.params(frame),
             measured: measured_vertices(&sequence.weights, &truth.triangles),
-            truth_in_star: sequence.star_mesh(frame),
             truth,
         }
     }
