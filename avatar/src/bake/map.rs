@@ -249,8 +249,9 @@ mod tests {
             .unwrap()
             .unwrap();
         println!("left-out motions: {:?}", map.error);
-        // A third of what poses do is the least that a map of fourteen motions is worth.
-        assert!(map.error.p95_mm < 2.0 && map.error.rms_mm < map.error.still_rms_mm / 3.0);
+        // Not the millimetre that live avatars are held to: untuned, the prior would ask its field.
+        let BakeError { rms_mm, p95_mm, still_rms_mm } = map.error;
+        assert!(p95_mm < 1.5 && p95_mm < still_rms_mm && rms_mm < still_rms_mm / 3.0);
 
         let mut mapped = Driver::new(avatar, DriveConfig::default()).with_map(map);
         let mut errors_mm = Vec::new();
@@ -266,7 +267,7 @@ mod tests {
         errors_mm.sort_by(f32::total_cmp);
         let p95_mm = errors_mm[errors_mm.len() * 95 / 100];
         println!("bending, never learned: p95 {p95_mm} mm");
-        assert!(p95_mm < 2.5);
+        assert!(p95_mm < 1.5);
 
         // Elbows and knees the wrong way round: nothing is known of that, so the field is asked.
         let mut strange = learned[0].poses[0];

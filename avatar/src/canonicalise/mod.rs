@@ -209,19 +209,11 @@ impl Canonicaliser {
         // A quarter more than wanted, since some will be dropped.
         let seen = seen.pick(self.config.points * 5 / 4, &mut rng);
         let unposer = self.unposer(&posed, &warp);
-        let (points_in_unit, normals, weights) = self.surface(&seen, &unposer, &mut counts);
+        let mut samples = self.surface(&seen, &params, &unposer, &mut counts);
 
         let free = free_space::points_in_world(frame, self.rays.as_ref(), &self.config, &mut rng);
-        let free_in_unit = self.free(&free, &unposer);
-        counts.free = free_in_unit.len();
-        let samples = CanonicalSamples {
-            theta: params.theta,
-            pose: self.subject.pose_input(&params.theta),
-            points_in_unit,
-            normals,
-            weights,
-            free_in_unit,
-        };
+        samples.free_in_unit = self.free(&free, &unposer);
+        counts.free = samples.free_in_unit.len();
         Some((samples, counts))
     }
 
@@ -241,16 +233,8 @@ impl Canonicaliser {
             weights: vec![1.0; surface.len()],
         };
         let mut counts = CanonicaliseCounts { observed: surface.len(), ..Default::default() };
-        let (points_in_unit, normals, weights) =
-            self.surface(&known, &self.unposer(&posed, &warp), &mut counts);
-        let samples = CanonicalSamples {
-            theta: params.theta,
-            pose: self.subject.pose_input(&params.theta),
-            points_in_unit,
-            normals,
-            weights,
-            free_in_unit: Vec::new(),
-        };
+        let unposer = self.unposer(&posed, &warp);
+        let samples = self.surface(&known, &params, &unposer, &mut counts);
         (samples, counts)
     }
 
@@ -322,19 +306,27 @@ impl Canonicaliser {
         }
     }
 
-    /// Unit-space points, normals and weights of what passes all tests.
+    /// Samples of what passes all tests, without empty points.
     fn surface(
         &self,
         seen: &Observed,
+        params: &BodyParams,
         unposer: &Unposer<'_>,
         counts: &mut CanonicaliseCounts,
-    ) -> (Vec<Vec3>, Vec<Vec3>, Vec<f32>) {
+    ) -> CanonicalSamples {
         let (reach_m, margin_m) = (self.config.contact_reach_m, self.config.contact_margin_m);
         let contacts = Contacts::new(&self.model, &unposer.posed.vertices, reach_m, margin_m);
         let undecided = contacts.are_undecided(&seen.points);
         let limit_m = self.config.max_distance_to_body_m;
         let returned = unposer.unpose(&seen.points, &seen.normals, limit_m);
-        let (mut points, mut normals, mut weights) = (Vec::new(), Vec::new(), Vec::new());
+        let mut samples = CanonicalSamples {
+            theta: params.theta,
+            pose: self.subject.pose_input(&params.theta),
+            points_in_unit: Vec::new(),
+            normals: Vec::new(),
+            weights: Vec::new(),
+            free_in_unit: Vec::new(),
+        };
         let judged = returned.iter().zip(&seen.weights).zip(undecided);
         for ((point, &weight), undecided) in judged {
             let in_unit = self.subject.unit_box.unit_from_canonical(point.canonical);
@@ -346,14 +338,14 @@ impl Canonicaliser {
                 counts.not_returned += 1;
             } else if !in_unit_box(in_unit) {
                 counts.outside_box += 1;
-            } else if points.len() < self.config.points {
-                points.push(in_unit);
-                normals.push(point.normal);
-                weights.push(weight);
+            } else if samples.points_in_unit.len() < self.config.points {
+                samples.points_in_unit.push(in_unit);
+                samples.normals.push(point.normal);
+                samples.weights.push(weight);
             }
         }
-        counts.kept = points.len();
-        (points, normals, weights)
+        counts.kept = samples.points_in_unit.len();
+        samples
     }
 
     /// Unit-space places of empty points near the body.

@@ -28,17 +28,23 @@ fn signed_m(suit: &Suit, samples: &CanonicalSamples, points: &[Vec3]) -> Vec<f32
     distances
 }
 
+/// Distances of a person's surface points from the truth in metres, sorted.
+fn errors_m(suit: &Suit, samples: &CanonicalSamples) -> Vec<f32> {
+    let mut errors = signed_m(suit, samples, &samples.points_in_unit);
+    for error in &mut errors {
+        *error = error.abs();
+    }
+    errors.sort_by(f32::total_cmp);
+    errors
+}
+
 #[test]
 fn surface_points_land_on_the_canonical_surface_within_millimetres() {
     let suit = Suit::new(0.01);
     for (number, params) in everyday_poses().iter().enumerate() {
         let frame = suit.frame(params, number as u64);
         let (samples, counts) = canonicaliser(&suit).process(&frame).unwrap();
-        let mut errors = signed_m(&suit, &samples, &samples.points_in_unit);
-        for error in &mut errors {
-            *error = error.abs();
-        }
-        errors.sort_by(f32::total_cmp);
+        let errors = errors_m(&suit, &samples);
         let mean = errors.iter().sum::<f32>() / errors.len() as f32;
         let p95 = errors[errors.len() * 95 / 100];
         println!(
@@ -110,11 +116,7 @@ fn a_known_surface_lands_on_the_canonical_one_and_belongs_to_the_same_person() {
     let surface = sample_surface(&suit.in_world(&params), 3000, 1);
     let canonicaliser = canonicaliser(&suit);
     let (samples, counts) = canonicaliser.process_surface(&params, &surface);
-    let mut errors = signed_m(&suit, &samples, &samples.points_in_unit);
-    for error in &mut errors {
-        *error = error.abs();
-    }
-    errors.sort_by(f32::total_cmp);
+    let errors = errors_m(&suit, &samples);
     let p95 = errors[errors.len() * 95 / 100];
     println!("{counts:?}, p95 {p95} m");
     assert!(counts.kept > 2700 && counts.observed == 3000, "{counts:?}");
