@@ -98,8 +98,8 @@ pub(crate) struct SceneArgs {
     /// skirt, dress
     #[arg(long, default_value = "demo", value_parser = named::<OutfitKind>)]
     pub(crate) outfit: OutfitKind,
-    /// A skinned glTF character (.glb, .gltf) instead of our own people; `--outfit` is the character's then
-    #[arg(long, value_name = "FILE")]
+    /// A skinned glTF character (.glb, .gltf) instead of our own people, in its own clothes
+    #[arg(long, value_name = "FILE", conflicts_with = "outfit")]
     pub(crate) character: Option<PathBuf>,
     /// One of the character's own movements, by name, instead of `--motion`
     #[arg(long, value_name = "NAME", requires = "character")]
@@ -145,6 +145,10 @@ pub(crate) struct SimulateArgs {
     /// The recording to write
     #[arg(long)]
     pub(crate) out: PathBuf,
+    /// A scenario as JSON (`{"version": 1, "outfit": "dress", "fit": 0.8}`) instead of all options below; what it does
+    /// not name is as usual, 20 s long
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["sensor", "motion", "outfit", "character", "clip", "seed", "seconds"])]
+    pub(crate) scenario: Option<PathBuf>,
     #[command(flatten)]
     pub(crate) scene: SceneArgs,
 }

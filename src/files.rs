@@ -1,12 +1,12 @@
 //! Files that the program writes for its users: tried before the work, and with errors that say what to do.
 
 use std::{
-    fs::{self, OpenOptions},
-    io,
+    fs::{self, File, OpenOptions},
+    io::{self, Read as _},
     path::Path,
 };
 
-use anyhow::Context as _;
+use anyhow::{Context as _, ensure};
 use serde::{Serialize, de::DeserializeOwned};
 
 /// Fails now rather than after the work; an existing file stays as it is.
@@ -17,6 +17,21 @@ pub(crate) fn check_writable(path: &Path) -> anyhow::Result<()> {
 
 pub(crate) fn write(path: &Path, content: impl AsRef<[u8]>) -> anyhow::Result<()> {
     explained(fs::write(path, content), path)
+}
+
+/// A text file of at most so many bytes.
+pub(crate) fn read_text(path: &Path, most_bytes: u64) -> anyhow::Result<String> {
+    let cannot = || format!("{}: cannot read it", path.display());
+    let mut text = String::new();
+    let file = File::open(path).with_context(cannot)?;
+    let read = file.take(most_bytes + 1).read_to_string(&mut text);
+    let found = read.with_context(cannot)?;
+    ensure!(
+        found as u64 <= most_bytes,
+        "{}: expected at most {most_bytes} bytes, found more",
+        path.display()
+    );
+    Ok(text)
 }
 
 /// Settings from a TOML file; what it does not name keeps its default.

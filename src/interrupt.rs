@@ -40,6 +40,14 @@ impl Stopped {
         Self("the table holds what was done till then".to_owned())
     }
 
+    /// A file that ends before what it was to hold.
+    pub(crate) fn short(path: &Path, frames: u64) -> Self {
+        Self(format!(
+            "{} holds the {frames} frames till then",
+            path.display()
+        ))
+    }
+
     /// What is there is found with `--resume`.
     pub(crate) fn at_checkpoint(checkpoint: &Path) -> Self {
         Self(format!("`--resume` goes on from {}", checkpoint.display()))

@@ -336,6 +336,46 @@ fn figures_that_ctrl_c_cut_short_are_printed_and_not_called_whole() {
 }
 
 #[test]
+fn a_recording_that_ctrl_c_cut_short_says_how_much_of_it_there_is() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = Command::new(env!("CARGO_BIN_EXE_effigy"))
+        .current_dir(folder.path())
+        .args(["simulate", "--seconds", "600", "--out", "s.mcap"])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    // The file is there once frames are written.
+    while !folder.path().join("s.mcap").exists() {
+        thread::sleep(Duration::from_millis(20));
+    }
+    let id = run.id().to_string();
+    let told = Command::new("kill").args(["-INT", &id]).status().unwrap();
+    assert!(told.success());
+    let output = run.wait_with_output().unwrap();
+    assert_fails(&output, STOPPED, &["s.mcap holds the", "frames till then"]);
+    assert_succeeds(&effigy(folder.path(), &["info", "s.mcap"]));
+}
+
+#[test]
+fn a_scenario_file_is_simulated_and_a_wrong_one_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let simulate = ["simulate", "--scenario", "s.json", "--out", "s.mcap"];
+    let scenario =
+        r#"{"version": 1, "sensor": "oak", "seconds": 0.2, "rate_hz": 10, "room": "empty"}"#;
+    fs::write(here.join("s.json"), scenario).unwrap();
+    let output = effigy(here, &simulate);
+    assert_succeeds(&output);
+    let said = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(said.contains("s.mcap: 2 frames"), "{said}");
+    fs::write(here.join("s.json"), r#"{"version": 1, "sensr": "oak"}"#).unwrap();
+    assert_fails(&effigy(here, &simulate), DATA, &["s.json", "sensr"]);
+    let both = [&simulate[..], &["--seed", "3"]].concat();
+    assert_fails(&effigy(here, &both), USAGE, &["--seed"]);
+}
+
+#[test]
 fn a_live_run_that_was_recorded_repeats_itself() {
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();

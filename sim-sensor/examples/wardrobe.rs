@@ -22,7 +22,7 @@ use glam::{Quat, Vec3};
 use image::{RgbImage, codecs::jpeg::JpegEncoder, imageops};
 
 const RATE_HZ: f32 = 30.0;
-const CELL: [u32; 2] = [300, 500];
+const CELL: [u32; 2] = [400, 500];
 /// What is done, for how many frames, and in which of them the picture is taken.
 const ACTS: [(Routine, usize, usize); 4] = [
     (Routine::Stand, 30, 29),
@@ -51,6 +51,8 @@ struct Findings {
     frame_secs: Vec<f64>,
     /// Clothes held in one pose after different acts.
     settled: Vec<Vec<Vec3>>,
+    /// From the last frame but one to the last, and as the solver has it.
+    settled_moves_m: Vec<f32>,
     settled_speeds_m_s: Vec<f32>,
 }
 
@@ -58,7 +60,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let options = options()?;
     fs::create_dir_all(&options.out)?;
     println!(
-        "| outfit | points | deeper than 2 mm | deepest | strain > 15 % (worst act) | ms a frame (max) | offset varies, rms (p90) | history floor, rms (p90) | speed after 2 s |"
+        "| outfit | points | deeper than 2 mm | deepest | strain > 15 % (worst act) | ms a frame (max) | offset varies, rms (p90) | history floor, rms (p90) | moves after 2 s (solver) |"
     );
     println!("|---|---|---|---|---|---|---|---|---|");
     for &kind in &options.kinds {
@@ -162,12 +164,16 @@ impl Findings {
             let share = frame as f32 / HOLD_FRAMES[0] as f32;
             wear.step(&from.interpolate(stance, share), RATE_HZ.recip());
         }
+        let places = |wear: &Wear| -> Vec<Vec3> { wear.points().flatten().copied().collect() };
+        let mut before = Vec::new();
         for _ in 0..HOLD_FRAMES[1] {
+            before = places(&wear);
             wear.step(stance, RATE_HZ.recip());
         }
-        self.settled
-            .push(wear.points().flatten().copied().collect());
+        let after = places(&wear);
+        self.settled_moves_m.push(rms_between_m(&before, &after));
         self.settled_speeds_m_s.extend(wear.speeds_m_s());
+        self.settled.push(after);
     }
 
     fn row(&self, kind: ClothKind, points: &str) -> String {
@@ -188,7 +194,7 @@ impl Findings {
         let mean_ms = 1e3 * self.frame_secs.iter().sum::<f64>() / self.frame_secs.len() as f64;
         let max_ms = 1e3 * self.frame_secs.iter().copied().fold(0.0, f64::max);
         format!(
-            "| `{}` | {points} | {:.3} % | {:.1} mm | {:.2} ({:.2}) % | {mean_ms:.0} ({max_ms:.0}) | {:.1} ({:.1}) mm | {:.1} ({:.1}) mm | {:.1} mm/s |",
+            "| `{}` | {points} | {:.3} % | {:.1} mm | {:.2} ({:.2}) % | {mean_ms:.0} ({max_ms:.0}) | {:.1} ({:.1}) mm | {:.1} ({:.1}) mm | {:.1} ({:.1}) mm/s |",
             kind.name(),
             100.0 * self.behaviour.deep_share(),
             -1e3 * self.clearances_m.iter().copied().fold(0.0, f32::min),
@@ -198,6 +204,7 @@ impl Findings {
             1e3 * p90(strays.clone()),
             1e3 * rms_between_m(first, second),
             1e3 * p90(apart),
+            1e3 * RATE_HZ * rms(&self.settled_moves_m),
             1e3 * rms(&self.settled_speeds_m_s),
         )
     }

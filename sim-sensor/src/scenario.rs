@@ -225,7 +225,8 @@ impl Scenario {
             MotionChoice::Routine(routine) => routine.motion(rest, self.rate_hz(), self.seed),
             MotionChoice::Bvh(path) | MotionChoice::File(path) => motion::open(path, rest)?
                 .in_place()
-                .starting_at_origin(rest),
+                .starting_at_origin(rest)
+                .closed(),
         })
     }
 

@@ -50,7 +50,7 @@ impl Scene {
         self.motion.duration_secs()
     }
 
-    /// Movements end as they begin, so they repeat for as long as the scenario lasts.
+    /// Movements end as they begin (recorded ones go there and back), so they repeat for as long as the scenario lasts.
     pub(crate) fn pose(&self, frame: FrameId) -> MotionPose {
         let secs = self
             .scenario

@@ -151,6 +151,9 @@ fn cloth_table(manifest: &Manifest) -> String {
 
 /// A row a sequence; of each outfit at most `--rows`.
 fn view(args: &DatasetViewArgs) -> anyhow::Result<()> {
+    if args.rows == 0 {
+        bail!("--rows is 0, expected at least 1");
+    }
     let body = match &args.body {
         Some(path) => Arc::new(BodyModel::load(path)?),
         None => builtin::body(),

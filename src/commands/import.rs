@@ -6,7 +6,7 @@ use effigy_capture::{FrameSource as _, import::tum::TumFolder, recording::Record
 
 use crate::{
     cli::{ImportArgs, ImportKind},
-    interrupt,
+    interrupt::{self, Stopped},
     progress::Progress,
     say::say,
 };
@@ -29,6 +29,9 @@ pub(crate) fn run(args: &ImportArgs) -> anyhow::Result<()> {
     }
     progress.finish();
     let summary = writer.finish()?;
+    if interrupt::requested() {
+        return Err(Stopped::short(&args.out, summary.frames).into());
+    }
     say!("{}: {} frames", args.out.display(), summary.frames);
     Ok(())
 }

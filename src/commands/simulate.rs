@@ -8,16 +8,35 @@ use effigy_registration::smpl::builtin;
 use effigy_sim_sensor::{Scenario, SimulatedSensor};
 
 use super::scene::{SECONDS, scenario};
-use crate::{cli::SimulateArgs, interrupt, progress::Progress, say::say};
+use crate::{
+    cli::SimulateArgs,
+    files,
+    interrupt::{self, Stopped},
+    progress::Progress,
+    say::say,
+};
 
 /// Where a recording keeps the scenario it was made from: the truth, to be computed again.
 pub(crate) const SCENARIO_KEY: &str = "effigy.scenario";
 
 pub(crate) fn run(args: &SimulateArgs) -> anyhow::Result<()> {
-    let scenario = scenario(&args.scene, SECONDS)?;
+    let scenario = match &args.scenario {
+        Some(path) => read_scenario(path)?,
+        None => scenario(&args.scene, SECONDS)?,
+    };
     let frames = record(&scenario, &args.out)?;
+    if interrupt::requested() {
+        return Err(Stopped::short(&args.out, frames).into());
+    }
     say!("{}: {frames} frames", args.out.display());
     Ok(())
+}
+
+fn read_scenario(path: &Path) -> anyhow::Result<Scenario> {
+    /// A scenario has some lines.
+    const MOST_BYTES: u64 = 1 << 20;
+    let text = files::read_text(path, MOST_BYTES)?;
+    Scenario::from_json(&text).with_context(|| path.display().to_string())
 }
 
 /// Writes what the sensor sees, with the scenario beside it; how many frames it was.

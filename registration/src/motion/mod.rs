@@ -101,7 +101,35 @@ impl Motion {
     }
 }
 
+/// Ends closer than this meet: what a body does in a thirtieth of a second.
+const MEETING_RAD: f32 = 0.2;
+const MEETING_M: f32 = 0.05;
+
+impl Motion {
+    /// Ends as it begins, so that it can be repeated: as it is where its ends meet, else there and back.
+    pub fn closed(mut self) -> Self {
+        let meet = match (self.poses.first(), self.poses.last()) {
+            (Some(first), Some(last)) => first.is_near(last),
+            _ => true,
+        };
+        if !meet {
+            let back: Vec<MotionPose> = self.poses.iter().rev().skip(1).copied().collect();
+            self.poses.extend(back);
+        }
+        self
+    }
+}
+
 impl MotionPose {
+    fn is_near(&self, other: &Self) -> bool {
+        let turned = |joint: usize| {
+            let [from, to] = [self, other].map(|pose| Quat::from_scaled_axis(pose.theta[joint]));
+            from.angle_between(to)
+        };
+        self.trans.distance(other.trans) < MEETING_M
+            && (0..JOINT_COUNT).all(|joint| turned(joint) < MEETING_RAD)
+    }
+
     /// From `self` (0) to `other` (1), each joint along the shorter arc.
     pub fn interpolate(&self, other: &Self, share: f32) -> Self {
         let theta = std::array::from_fn::<_, JOINT_COUNT, _>(|joint| {
@@ -149,6 +177,15 @@ mod tests {
         assert_eq!(motion.at(-1.0).unwrap().trans.x, 0.0);
         assert!((motion.at(9.0).unwrap().trans.x - 0.2).abs() < 1e-6, "held");
         assert_eq!(motion.resampled(100.0).poses.len(), 11);
+    }
+
+    #[test]
+    fn a_motion_that_does_not_end_as_it_begins_goes_back() {
+        let poses = vec![pose(0.0, 0.0), pose(0.5, 0.0), pose(1.0, 0.0)];
+        let motion = Motion { name: "bend".to_owned(), rate_hz: 1.0, poses }.closed();
+        let angles: Vec<f32> = motion.poses.iter().map(|pose| pose.theta[18].y).collect();
+        assert_eq!(angles, [0.0, 0.5, 1.0, 0.5, 0.0]);
+        assert_eq!(motion.clone().closed(), motion, "it ends as it begins now");
     }
 
     #[test]

@@ -21,6 +21,8 @@ const TUCK_REACH_M: f32 = 0.010;
 const LAYER_REACH_M: f32 = 0.030;
 /// What is under a garment is drawn at least this far below it.
 const TUCK_M: f32 = 0.003;
+/// What is this close under a garment, or over it, cannot be seen: the gap is too narrow to look into.
+const COVERED_M: f32 = 0.020;
 /// Cameras around a person for finding what can be seen: azimuths, height in radians, all from this far.
 const RINGS: [(usize, f32); 4] = [(10, 0.0), (8, 0.6), (6, -0.45), (1, 1.45)];
 const CAMERA_M: f32 = 7.0;
@@ -56,6 +58,7 @@ impl Wear {
         let mut posed = TriangleMesh::new(vertices, triangles);
         posed.compute_normals();
         tuck(&mut posed, &layers, self.layers());
+        leave_out_covered(&mut posed, &layers, self.layers());
         posed.compute_normals();
         (posed, weights, layers)
     }
@@ -109,6 +112,22 @@ fn tuck(mesh: &mut TriangleMesh, layers: &[u8], garments: &[Collider]) {
             }
         }
     }
+}
+
+/// Drops the triangles of garments that lie close under another one: where that is folded, they would come out between
+/// its points.
+fn leave_out_covered(mesh: &mut TriangleMesh, layers: &[u8], garments: &[Collider]) {
+    let is_covered = |v: usize| {
+        let over = garments.iter().skip(layers[v] as usize);
+        layers[v] > 0
+            && over.into_iter().any(|garment| {
+                let touch = garment.nearest(mesh.vertices[v], COVERED_M, NONE);
+                touch.is_some_and(|touch| !touch.on_rim)
+            })
+    };
+    let covered: Vec<bool> = (0..layers.len()).map(is_covered).collect();
+    mesh.triangles
+        .retain(|corners| !corners.iter().all(|&v| covered[v as usize]));
 }
 
 impl ClothedSurface {

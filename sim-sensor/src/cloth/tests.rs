@@ -96,6 +96,71 @@ fn cloth_stays_outside_the_body_and_keeps_its_size_while_arms_are_raised() {
     );
 }
 
+/// What nothing else here looks at in particular: on the way down and up again in the middle size.
+#[test]
+fn every_outfit_stays_outside_and_as_long_as_it_was_cut() {
+    for kind in [
+        ClothKind::TshirtShorts,
+        ClothKind::LongsleeveTrousers,
+        ClothKind::PoloTrousers,
+        ClothKind::HoodieTrousers,
+        ClothKind::Dress,
+    ] {
+        let mut wear = wear(kind, 0.5, 4);
+        let poses = opening(&wear, Routine::Squat, 60);
+        let mut behaviour = Behaviour::default();
+        wear.start(&poses[0]);
+        for (number, pose) in poses.iter().step_by(2).enumerate() {
+            wear.step(pose, 2.0 * FRAME_SECS);
+            behaviour.add_strains(&wear);
+            if number % 5 == 0 {
+                behaviour.add_clearances(&wear.clearances_m());
+            }
+        }
+        let (deep, strained) = (behaviour.deep_share(), behaviour.strained_share());
+        println!("{}: {deep} deep, {strained} strained", kind.name());
+        assert!(
+            deep < 1e-3,
+            "{}: {deep} of all points are deeper than 2 mm",
+            kind.name()
+        );
+        assert!(
+            strained < 0.01,
+            "{}: {strained} of all edges are strained",
+            kind.name()
+        );
+    }
+}
+
+/// In a squat jackets fold over the shoulders: seen between the folds, a shirt would have patches of white there.
+#[test]
+fn what_lies_close_under_a_jacket_is_not_seen() {
+    let mut wear = wear(ClothKind::BlazerTrousers, 0.8, 1);
+    let poses = opening(&wear, Routine::Squat, 46);
+    wear.start(&poses[0]);
+    for pose in &poses {
+        wear.step(pose, FRAME_SECS);
+    }
+    let seen = wear.surface().envelope();
+    let is_shoulder = |v: u32| {
+        let star = seen.canonical.vertices[v as usize];
+        let shirt = seen.layers[v as usize] == 1;
+        shirt && star.x.abs() > 0.09 && star.y > 0.2
+    };
+    let area_m2 = |triangle: &[u32; 3]| {
+        let [a, b, c] = triangle.map(|v| seen.posed.vertices[v as usize]);
+        0.5 * (b - a).cross(c - a).length()
+    };
+    let shoulders = seen
+        .posed
+        .triangles
+        .iter()
+        .filter(|t| t.iter().all(|&v| is_shoulder(v)));
+    let shown_m2: f32 = shoulders.map(area_m2).sum();
+    println!("{} cm2 of the shirt show at the shoulders", 1e4 * shown_m2);
+    assert!(shown_m2 < 3e-4, "{} cm2", 1e4 * shown_m2);
+}
+
 /// Without the room that is let out, 3 % of the edges of this one are strained on the way down.
 #[test]
 fn tight_clothes_have_room_for_a_squat() {

@@ -25,7 +25,7 @@ pub struct ClothFacts {
     pub strays_rms_mm: f32,
     /// The same of the point that a tenth of them stray further than.
     pub strays_p90_mm: f32,
-    /// Share of edges longer or shorter than cut by more than 15 %, and of points deeper than 2 mm inside the minimal
+    /// Share of edges longer or shorter than cut and let out by more than 15 %, and of points deeper than 2 mm inside the minimal
     /// body, 0 to 1, over the frames; points in every fourth.
     pub strained_share: f32,
     pub deep_share: f32,

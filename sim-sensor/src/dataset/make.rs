@@ -69,7 +69,7 @@ pub(super) type MakeOne<'a> = dyn Fn(&SequencePlan, &mut dyn FnMut() -> bool) ->
 pub(super) fn make_all(work: &Work<'_>, one: &MakeOne<'_>) -> Result<Option<Manifest>, SimError> {
     let Work { plan, body, folder, go_on } = *work;
     fs::create_dir_all(folder).map_err(io(folder))?;
-    refuse_another(plan, folder)?;
+    refuse_another(work)?;
     let (done, found) = (AtomicU64::new(0), AtomicU64::new(0));
     let progress = || MakeProgress {
         frames: done.load(Ordering::Relaxed),
@@ -116,20 +116,63 @@ pub(super) fn make_all(work: &Work<'_>, one: &MakeOne<'_>) -> Result<Option<Mani
     Ok(Some(manifest))
 }
 
-/// A folder keeps its data set: what took an hour is not replaced by a slip of the hand.
-fn refuse_another(plan: &DatasetPlan, folder: &Path) -> Result<(), SimError> {
+/// A folder keeps its data set: what took an hour is not replaced by a slip of the hand. Looks at all there is before
+/// anything is made.
+fn refuse_another(work: &Work<'_>) -> Result<(), SimError> {
+    const ELSEWHERE: &str = "choose an empty folder, or delete this one";
+    let Work { plan, body, folder, .. } = *work;
     let path = folder.join(MANIFEST);
-    let found = read_bounded(&path).ok();
-    let found = found.and_then(|text| serde_json::from_slice::<Manifest>(&text).ok());
-    match found {
-        Some(found) if (found.preset, found.seed) != (plan.preset, plan.seed) => {
-            let (preset, seed) = (found.preset, found.seed);
-            let problem = format!(
-                "here is another data set ({preset:?}, seed {seed}); choose an empty folder, or delete this one"
-            );
-            Err(SimError::Dataset { path, problem })
+    if path.exists() {
+        let text = read_bounded(&path);
+        let found = text.and_then(|text| {
+            serde_json::from_slice::<Manifest>(&text).map_err(|error| error.to_string())
+        });
+        let problem = match found {
+            Ok(found) => found.differs_from(plan, body),
+            Err(problem) => Some(format!("which data set is here cannot be told ({problem})")),
+        };
+        if let Some(problem) = problem {
+            let problem = format!("{problem}; {ELSEWHERE}");
+            return Err(SimError::Dataset { path, problem });
         }
-        _ => Ok(()),
+    }
+    for sequence in &plan.sequences {
+        let path = folder.join(format!("{}.npz", sequence.name));
+        let found = read_bounded(&path).ok();
+        let found = found.and_then(|bytes| Some((unpack(&bytes).ok()?.plan, body_of(&bytes))));
+        let another = found.is_some_and(|(found, found_body)| {
+            let same_program = found.generator == sequence.generator;
+            found_body.is_some_and(|found| found != body) || (same_program && found != *sequence)
+        });
+        if another {
+            let problem = format!("this sequence is part of another data set; {ELSEWHERE}");
+            return Err(SimError::Dataset { path, problem });
+        }
+    }
+    Ok(())
+}
+
+impl Manifest {
+    /// Why a folder with this manifest is not one to make a plan in; `None` if it is.
+    fn differs_from(&self, plan: &DatasetPlan, body: BodyIdentity) -> Option<String> {
+        if (self.preset, self.seed) != (plan.preset, plan.seed) {
+            let (preset, seed) = (self.preset, self.seed);
+            return Some(format!(
+                "here is another data set ({preset:?}, seed {seed})"
+            ));
+        }
+        if self.body != body {
+            return Some("here is a data set of another body".to_owned());
+        }
+        let planned = |entry: &SequenceEntry| {
+            let name = &entry.plan.name;
+            plan.sequences.iter().any(|sequence| sequence.name == *name)
+        };
+        let stranger = self.sequences.iter().find(|entry| !planned(entry))?;
+        Some(format!(
+            "here is a data set with other sequences ({})",
+            stranger.plan.name
+        ))
     }
 }
 

@@ -60,8 +60,8 @@ pub struct SequenceEntry {
 }
 
 impl Manifest {
-    /// The least mean error (`D_f`) that a function of the pose can have on this person in this outfit: the mean over
-    /// their sequences. `None` where it was not measured or nothing is simulated.
+    /// The least mean error (`D_f`) over two visits to the same poses that a function of the pose can have on this person
+    /// in this outfit: the mean over their sequences. `None` where it was not measured or nothing is simulated.
     pub fn history_floor_cm(&self, split: Split, subject: u32, outfit: OutfitName) -> Option<f32> {
         let of_wearer = self.sequences.iter().filter(|entry| {
             let plan = &entry.plan;
@@ -135,7 +135,14 @@ impl Dataset {
                 "its checksum is not the manifest's; delete it and make it again".to_owned(),
             ));
         }
-        unpack(&bytes).map_err(wrong)
+        let sequence = unpack(&bytes).map_err(&wrong)?;
+        if sequence.plan != entry.plan || sequence.cloth != entry.cloth {
+            return Err(wrong(
+                "what it says about itself is not what the manifest says; make the data set again"
+                    .to_owned(),
+            ));
+        }
+        Ok(sequence)
     }
 }
 

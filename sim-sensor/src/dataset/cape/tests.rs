@@ -221,6 +221,12 @@ fn only_one_gender_is_taken_if_asked_for() {
             .iter()
             .all(|entry| entry.plan.subject == 122)
     );
+    // The other people into the same folder, or everybody: its manifest would forget these.
+    let others = CapeImport { gender: Some(Gender::Male), ..CapeImport::default() };
+    let error = import_cape(raw.path(), &builtin::body(), &others, out.path(), &all)
+        .unwrap_err()
+        .to_string();
+    assert!(error.contains("other sequences"), "{error}");
     fs::write(
         raw.path().join("cape_release/misc/subj_genders.pkl"),
         b"garbage",

@@ -99,6 +99,12 @@ fn damage_is_found_and_named() {
     fs::write(&path, &bytes[..middle]).unwrap();
     let error = dataset.load(entry).unwrap_err().to_string();
     assert!(error.contains("bytes"), "{error}");
+    let renamed = SequenceEntry {
+        plan: SequencePlan { subject: 7, ..entry.plan.clone() },
+        ..dataset.manifest().sequences[1].clone()
+    };
+    let error = dataset.load(&renamed).unwrap_err().to_string();
+    assert!(error.contains("about itself"), "{error}");
     // Made again, as if it had never been damaged.
     assert_eq!(made(&plan(), folder.path()).manifest(), dataset.manifest());
 }

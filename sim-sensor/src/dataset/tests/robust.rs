@@ -11,11 +11,12 @@ use effigy_registration::smpl::{BodyIdentity, JOINT_COUNT, VertexWeights, builti
 use glam::Vec3;
 use zip::{ZipArchive, ZipWriter, write::SimpleFileOptions};
 
-use super::{made, plan};
+use super::{made, plan, scenario_of};
 use crate::dataset::{
     Dataset, DatasetPlan, Manifest, Sequence, SequenceFrame,
     archive::Packer,
     make,
+    make::{Work, make_all},
     packing::{pack, unpack},
 };
 
@@ -272,7 +273,44 @@ fn a_folder_keeps_its_data_set_and_what_another_generator_made_is_made_again() {
     assert!(error.contains("another data set"), "{error}");
     assert_eq!(made(&plan, folder.path()).manifest(), whole.manifest());
 
-    let mut newer = plan;
+    let manifest = folder.path().join("manifest.json");
+    fs::write(&manifest, "{").unwrap();
+    let error = make(&plan, &builtin::body(), folder.path(), &|_| true)
+        .unwrap_err()
+        .to_string();
+    assert!(error.contains("cannot be told"), "{error}");
+
+    let mut newer = plan.clone();
+    fs::remove_file(&manifest).unwrap();
+    scenario_of(&mut newer.sequences[1]).seed += 1;
+    fs::remove_file(
+        folder
+            .path()
+            .join(format!("{}.npz", newer.sequences[0].name)),
+    )
+    .unwrap();
+    let error = make(&newer, &builtin::body(), folder.path(), &|_| true)
+        .unwrap_err()
+        .to_string();
+    let name = &newer.sequences[1].name;
+    assert!(
+        error.contains(name.as_str()) && error.contains("another data set"),
+        "{error}"
+    );
+    let files = fs::read_dir(folder.path()).unwrap().count();
+    assert_eq!(
+        files,
+        plan.sequences.len() - 1,
+        "nothing was made before it was refused"
+    );
+    let other_body = Work { plan: &plan, body: BODY, folder: folder.path(), go_on: &|_| true };
+    let error = make_all(&other_body, &|_, _| Ok(None))
+        .unwrap_err()
+        .to_string();
+    assert!(error.contains("another data set"), "{error}");
+    scenario_of(&mut newer.sequences[1]).seed -= 1;
+    made(&newer, folder.path());
+
     newer.sequences[0].generator += 1;
     let found = AtomicU64::new(0);
     make(&newer, &builtin::body(), folder.path(), &|now| {
