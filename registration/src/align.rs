@@ -11,8 +11,9 @@ use crate::{
     observe::{DataPoint, Observation},
     prior::surprise,
     residual::{
-        ClothSide, DepthPush, FloorTerm, JointLimits, Match, PointToPlane, PosePrior, Prediction,
-        Silhouette, Standing, Temporal, Term, sole_of_lower_foot,
+        ClothSide, DepthPush, FloorTerm, JointLimits, LegContact, LegsApart, Match, PointToPlane,
+        PosePrior, Prediction, Silhouette, Standing, Temporal, Term, leg_contacts,
+        sole_of_lower_foot,
     },
     smpl::JOINT_COUNT,
     solve::{Damping, Termination, take_step},
@@ -64,6 +65,9 @@ pub struct EnergyConfig {
     pub standing_weight: f32,
     pub standing_m: f32,
     pub joint_limit_rad: f32,
+    /// What it is worth that no leg is inside the other, and how exactly that is known.
+    pub contact_weight: f32,
+    pub contact_m: f32,
 }
 
 impl Default for EnergyConfig {
@@ -82,7 +86,7 @@ impl Default for EnergyConfig {
             contradiction_weight: 400.0,
             contradiction_m: 0.02,
             silhouette_slack_m: 0.012,
-            pose_prior_weight: 0.5,
+            pose_prior_weight: 1.0,
             temporal_weight: 1.0,
             still_noise_m: 0.0055,
             temporal_rotation_rad: 0.12,
@@ -91,6 +95,8 @@ impl Default for EnergyConfig {
             standing_weight: 1.0,
             standing_m: 0.01,
             joint_limit_rad: 0.05,
+            contact_weight: 20.0,
+            contact_m: 0.02,
         }
     }
 }
@@ -161,6 +167,7 @@ pub(crate) struct Evidence {
     contradictions: Contradictions,
     floor_vertices: Vec<u32>,
     soles: Vec<u32>,
+    leg_contacts: Vec<LegContact>,
     point_count: usize,
     widen: f32,
 }
@@ -240,6 +247,7 @@ impl Evidence {
             slack_cells,
             &mut self.contradictions,
         );
+        leg_contacts(body, &mut self.leg_contacts);
         if self.floor_vertices.is_empty() && context.grounded {
             self.floor_vertices = foot_vertices(&body.shaped.surface);
         }
@@ -309,7 +317,12 @@ impl Evidence {
             still_weight: energy.temporal_weight
                 * (observation.view.noise_m / energy.still_noise_m).powi(2),
         });
-        let mut terms: Vec<&dyn Term> = vec![&data, &push, &prior, &limits];
+        let legs = LegsApart {
+            contacts: &self.leg_contacts,
+            sigma_m: energy.contact_m,
+            weight: energy.contact_weight,
+        };
+        let mut terms: Vec<&dyn Term> = vec![&data, &push, &prior, &limits, &legs];
         if context.whole {
             terms.push(&silhouette);
         }

@@ -31,6 +31,9 @@ pub(crate) struct PointToPlane<'a> {
     pub(crate) weight: f32,
 }
 
+/// Where clothes span a hollow, what is outside of the body says little about it.
+const SAY_IN_HOLLOWS: f32 = 0.05;
+
 impl Term for PointToPlane<'_> {
     fn emit(&self, body: &PosedSurface<'_>, sink: &mut dyn RowSink) {
         let mut row = Row::new(0.0, 0.0);
@@ -41,7 +44,9 @@ impl Term for PointToPlane<'_> {
                 self.standoff_m * surface.clothed[vertex] + self.hair_m * surface.hairy[vertex];
             let distance_m = found.normal.dot(found.point - body.vertices[vertex]) - standoff_m;
             let (weight, cost) = self.cloth.weight_and_cost(distance_m, found.sigma_m);
-            let scale = self.weight * found.trust;
+            let spanned = distance_m > 0.0 && surface.spanned[vertex];
+            let say = if spanned { SAY_IN_HOLLOWS } else { 1.0 };
+            let scale = self.weight * found.trust * say;
             row.restart(distance_m, weight * scale, cost * scale);
             if sink.wants_derivatives() {
                 body.add_vertex(&mut row, vertex, -found.normal);
@@ -54,7 +59,7 @@ impl Term for PointToPlane<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::residual::checker;
+    use crate::residual::{CostSum, checker};
 
     #[test]
     fn derivatives_agree_with_finite_differences() {
@@ -78,5 +83,32 @@ mod tests {
             hair_m: 0.008,
             weight: 1.0,
         });
+    }
+
+    /// Trousers hang below the crotch; they must not pull the hips down.
+    #[test]
+    fn cloth_across_a_hollow_has_next_to_no_say_and_a_point_inside_has_all() {
+        let shaped = checker::test_surface();
+        let body = PosedSurface::new(&shaped, &checker::test_state());
+        let surface = &shaped.surface;
+        let vertex = (0..surface.spanned.len())
+            .find(|&v| surface.spanned[v])
+            .expect("a body has a crotch");
+        let cost = |off_m: f32| {
+            let normal = body.normals[vertex];
+            let found = Match {
+                vertex: vertex as u32,
+                point: body.vertices[vertex] + normal * off_m,
+                normal,
+                sigma_m: 0.003,
+                trust: 1.0,
+            };
+            let mut sum = CostSum::default();
+            let cloth = ClothSide { outside: 0.02, inside: 0.02, outlier: 10.0 };
+            PointToPlane { matches: &[found], cloth, standoff_m: 0.0, hair_m: 0.0, weight: 1.0 }
+                .emit(&body, &mut sum);
+            sum.0
+        };
+        assert!(cost(0.03) < 0.1 * cost(-0.03));
     }
 }

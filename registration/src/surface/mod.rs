@@ -4,9 +4,11 @@
 //! [`PosedSurface`] anew for each pose the solver tries.
 
 mod decimate;
+mod legs;
 mod posed;
 mod shaped;
 
+pub(crate) use legs::LegStation;
 pub(crate) use posed::PosedSurface;
 pub(crate) use shaped::ShapedSurface;
 
@@ -14,6 +16,7 @@ use std::sync::Arc;
 
 use glam::Vec3;
 
+use self::legs::leg_stations;
 use crate::smpl::{BodyModel, JOINT_COUNT, PARENTS, PoseDirection, VertexWeights};
 
 /// A coarse stand-in for a body model's surface that keeps its vertices' own shape, pose and skinning data.
@@ -31,6 +34,10 @@ pub(crate) struct Surface {
     pub(crate) clothed: Vec<f32>,
     /// For each vertex 1 where most people have hair, else 0.
     pub(crate) hairy: Vec<f32>,
+    /// For each vertex whether clothes span a hollow there instead of following the skin.
+    pub(crate) spanned: Vec<bool>,
+    /// Places down the legs, to keep one out of the other.
+    pub(crate) legs: Vec<LegStation>,
 }
 
 /// Neck, head, wrists, hands, ankles and feet.
@@ -69,6 +76,26 @@ fn hairy(model: &BodyModel, vertices: &[u32], skinning: &[VertexWeights]) -> Vec
         .collect()
 }
 
+/// At the crotch and on the inner sides of the thighs: trousers hang there, and without this pulled hips down by 2 cm.
+fn spanned(model: &BodyModel, vertices: &[u32], skinning: &[VertexWeights]) -> Vec<bool> {
+    const HIPS: [u8; 3] = [0, 1, 2];
+    /// Of the way from hip to knee.
+    const DOWN: f32 = 0.6;
+    /// How far a normal has to point down or to the other leg.
+    const TURNED: f32 = 0.15;
+    let joints = model.joints(&model.template);
+    let normals = vertex_normals(&model.template, &model.triangles);
+    let (top_y, bottom_y) = (joints[1].y, joints[1].lerp(joints[4], DOWN).y);
+    let is_spanned = |(&vertex, weights): (&u32, &VertexWeights)| {
+        let (place, normal) = (model.template[vertex as usize], normals[vertex as usize]);
+        let inwards = -normal.x * place.x.signum();
+        HIPS.contains(&weights.main_bone())
+            && (bottom_y..top_y).contains(&place.y)
+            && (inwards > TURNED || normal.y < -TURNED)
+    };
+    vertices.iter().zip(skinning).map(is_spanned).collect()
+}
+
 /// The joints that move a vertex, in ascending order, each with a mask of the vertex's bones it carries.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Influences {
@@ -93,10 +120,14 @@ impl Surface {
         let hairy = hairy(&model, &coarse.vertices, &skinning);
         let influences = skinning.iter().map(Influences::new).collect();
         let pose_dirs = restrict(&model.pose_dirs, &coarse.vertices, model.vertex_count());
+        let spanned = spanned(&model, &coarse.vertices, &skinning);
+        let legs = leg_stations(&model, &coarse.vertices, &skinning);
         Self {
             vertices: coarse.vertices,
             clothed,
             hairy,
+            spanned,
+            legs,
             triangles: coarse.triangles,
             skinning,
             influences,
