@@ -7,7 +7,7 @@ use std::{
     io::{self, BufRead as _, BufReader, Write as _},
     iter,
     path::Path,
-    process::{Command, Output, Stdio},
+    process::{Child, Command, Output, Stdio},
     thread,
     time::Duration,
 };
@@ -42,6 +42,15 @@ fn assert_fails(output: &Output, code: i32, needles: &[&str]) {
 fn assert_succeeds(output: &Output) {
     let message = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{message}");
+}
+
+fn press_ctrl_c(run: &Child) {
+    let id = run.id().to_string();
+    let told = Command::new("kill")
+        .args(["-INT", &id])
+        .status()
+        .expect("`kill` is there");
+    assert!(told.success());
 }
 
 fn simulate(folder: &Path, name: &str, seconds: &str) {
@@ -306,9 +315,7 @@ fn ctrl_c_ends_a_run_in_order_even_while_it_waits_for_an_avatar() {
     let mut said = BufReader::new(run.stderr.take().unwrap()).lines();
     let waits = |line: io::Result<String>| line.unwrap().starts_with("preview live");
     assert!(said.any(waits), "it waits for the avatar");
-    let id = run.id().to_string();
-    let told = Command::new("kill").args(["-INT", &id]).status().unwrap();
-    assert!(told.success());
+    press_ctrl_c(&run);
     let last_words: Vec<String> = said.map(Result::unwrap).collect();
     assert!(run.wait().unwrap().success(), "{last_words:?}");
     assert_eq!(report(&here.join("out"))["frames"]["in"], 120);
@@ -327,9 +334,7 @@ fn figures_that_ctrl_c_cut_short_are_printed_and_not_called_whole() {
         .unwrap();
     // Long enough to have begun, far too short to be done.
     thread::sleep(Duration::from_millis(300));
-    let id = run.id().to_string();
-    let told = Command::new("kill").args(["-INT", &id]).status().unwrap();
-    assert!(told.success());
+    press_ctrl_c(&run);
     let output = run.wait_with_output().unwrap();
     assert_fails(&output, STOPPED, &["stopped", "till then"]);
     assert!(String::from_utf8_lossy(&output.stdout).contains("| what | value |"));
@@ -338,7 +343,7 @@ fn figures_that_ctrl_c_cut_short_are_printed_and_not_called_whole() {
 #[test]
 fn a_recording_that_ctrl_c_cut_short_says_how_much_of_it_there_is() {
     let folder = tempfile::tempdir().unwrap();
-    let run = Command::new(env!("CARGO_BIN_EXE_effigy"))
+    let mut run = Command::new(env!("CARGO_BIN_EXE_effigy"))
         .current_dir(folder.path())
         .args(["simulate", "--seconds", "600", "--out", "s.mcap"])
         .stdout(Stdio::piped())
@@ -347,11 +352,10 @@ fn a_recording_that_ctrl_c_cut_short_says_how_much_of_it_there_is() {
         .unwrap();
     // The file is there once frames are written.
     while !folder.path().join("s.mcap").exists() {
+        assert!(run.try_wait().unwrap().is_none(), "it ended without a file");
         thread::sleep(Duration::from_millis(20));
     }
-    let id = run.id().to_string();
-    let told = Command::new("kill").args(["-INT", &id]).status().unwrap();
-    assert!(told.success());
+    press_ctrl_c(&run);
     let output = run.wait_with_output().unwrap();
     assert_fails(&output, STOPPED, &["s.mcap holds the", "frames till then"]);
     assert_succeeds(&effigy(folder.path(), &["info", "s.mcap"]));

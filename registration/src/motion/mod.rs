@@ -21,6 +21,10 @@ pub use retarget::{JointMap, limb_alignments};
 /// Movement of the whole body slower than this counts as travel.
 const WANDER_SECS: f32 = 0.6;
 
+/// Ends closer than this meet: what a body does in a thirtieth of a second.
+const MEETING_RAD: f32 = 0.2;
+const MEETING_M: f32 = 0.05;
+
 /// A sequence of poses at a fixed rate. `trans` is metres in the world (y up).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Motion {
@@ -99,13 +103,7 @@ impl Motion {
         }
         self
     }
-}
 
-/// Ends closer than this meet: what a body does in a thirtieth of a second.
-const MEETING_RAD: f32 = 0.2;
-const MEETING_M: f32 = 0.05;
-
-impl Motion {
     /// Ends as it begins, so that it can be repeated: as it is where its ends meet, else there and back.
     pub fn closed(mut self) -> Self {
         let meet = match (self.poses.first(), self.poses.last()) {

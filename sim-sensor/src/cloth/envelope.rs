@@ -118,9 +118,9 @@ fn tuck(mesh: &mut TriangleMesh, layers: &[u8], garments: &[Collider]) {
 /// its points.
 fn leave_out_covered(mesh: &mut TriangleMesh, layers: &[u8], garments: &[Collider]) {
     let is_covered = |v: usize| {
-        let over = garments.iter().skip(layers[v] as usize);
+        let mut over = garments.iter().skip(layers[v] as usize);
         layers[v] > 0
-            && over.into_iter().any(|garment| {
+            && over.any(|garment| {
                 let touch = garment.nearest(mesh.vertices[v], COVERED_M, NONE);
                 touch.is_some_and(|touch| !touch.on_rim)
             })

@@ -14,7 +14,7 @@ use rayon::prelude::*;
 
 use super::{
     manifest::{DATASET_SCHEMA, MANIFEST, Manifest, SequenceEntry, read_bounded, sha256},
-    packing::{body_of, pack, unpack},
+    packing::{body_of, pack, plan_of, unpack},
     plan::{DatasetPlan, SequencePlan},
     sequence::Sequence,
 };
@@ -139,7 +139,7 @@ fn refuse_another(work: &Work<'_>) -> Result<(), SimError> {
     for sequence in &plan.sequences {
         let path = folder.join(format!("{}.npz", sequence.name));
         let found = read_bounded(&path).ok();
-        let found = found.and_then(|bytes| Some((unpack(&bytes).ok()?.plan, body_of(&bytes))));
+        let found = found.and_then(|bytes| Some((plan_of(&bytes)?, body_of(&bytes))));
         let another = found.is_some_and(|(found, found_body)| {
             let same_program = found.generator == sequence.generator;
             found_body.is_some_and(|found| found != body) || (same_program && found != *sequence)

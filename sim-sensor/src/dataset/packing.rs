@@ -82,6 +82,11 @@ pub(super) fn body_of(bytes: &[u8]) -> Option<BodyIdentity> {
     identity.try_into().ok().map(BodyIdentity)
 }
 
+/// What a sequence was made from, without the sequence.
+pub(super) fn plan_of(bytes: &[u8]) -> Option<SequencePlan> {
+    plan(&mut Unpacker::new(bytes).ok()?).ok()
+}
+
 pub(super) fn plan(zip: &mut Unpacker<'_>) -> Result<SequencePlan, String> {
     serde_json::from_slice(&zip.array::<u8>("plan", &[])?)
         .map_err(|error| format!("array plan: {error}"))
