@@ -1,7 +1,7 @@
 //! A frame made metric, denoised, and reduced to the person.
 
 use effigy_capture::{Calibration, Frame, FrameId, Timestamp};
-use glam::{Vec3, Vec4};
+use glam::Vec3;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -95,7 +95,6 @@ pub struct Cleaner {
     bilateral: Bilateral,
     bodies: Vec<Body>,
     scratch_depth: Vec<f32>,
-    scratch_normals: Vec<Vec4>,
     spare: Option<Spare>,
 }
 
@@ -118,7 +117,6 @@ impl Cleaner {
             bilateral: Bilateral::new(&config.bilateral),
             bodies: Vec::new(),
             scratch_depth: Vec::new(),
-            scratch_normals: Vec::new(),
             spare: None,
             rays,
             calibration,
@@ -138,7 +136,7 @@ impl Cleaner {
         self.bodies = bodies;
         let filled = self.clean_person(&mut depth, &mut person, &region);
         let vertices = self.unproject_person(points, &depth, &person, &region);
-        let normals = NormalMap::within(normals, &vertices, &region, &mut self.scratch_normals);
+        let normals = NormalMap::within(normals, &vertices, &region);
         let sigma_m = self.sigma(sigma_m, (&vertices, &normals), &region, &filled);
         let (id, timestamp) = (frame.id, frame.timestamp);
         Ok(CleanFrame {

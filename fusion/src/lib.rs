@@ -9,6 +9,8 @@ mod disjoint_sets;
 pub mod error;
 pub mod maps;
 pub mod mesh;
+mod normals;
+pub mod simd;
 pub mod tsdf;
 
 pub use clean::{CleanConfig, CleanFrame, Cleaner};

@@ -3,14 +3,10 @@
 use std::ops::Range;
 
 use effigy_capture::{CameraModel, DepthImage};
-use glam::{Vec2, Vec3, Vec4};
+use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
-/// Neighbours whose depths differ by more than this share of the depth lie on different surfaces: a surface
-/// seen at 75 degrees changes by 1.5 % between the pixels compared here, and noise adds the rest.
-const STEP_SHARE: f32 = 0.025;
-/// Pixels between the neighbours a normal is computed from, to either side.
-const REACH_PX: usize = 2;
+use crate::simd;
 
 /// Depth along the optical axis, in metres.
 #[derive(Clone, Debug, PartialEq)]
@@ -106,7 +102,10 @@ impl DepthMap {
             if usable { depth_m } else { f32::NAN }
         };
         metres.clear();
-        metres.extend(image.pixels().iter().map(convert));
+        simd::run(
+            #[inline(always)]
+            || metres.extend(image.pixels().iter().map(convert)),
+        );
         Self { width: image.width() as usize, height: image.height() as usize, metres }
     }
 
@@ -146,181 +145,9 @@ impl VertexMap {
     }
 }
 
-impl NormalMap {
-    /// Normals of the surface through neighbouring points, smoothed over five pixels; steps in depth are
-    /// not bridged. NaN where there is no point, or where it has no neighbours.
-    pub fn from_vertices(vertices: &VertexMap) -> Self {
-        let whole = Region::whole(vertices.width, vertices.height);
-        let normals = vec![Vec3::NAN; vertices.points.len()];
-        Self::within(normals, vertices, &whole, &mut Vec::new())
-    }
-
-    /// As [`Self::from_vertices`] within a region; `normals` are NaN as yet, `rough` is working memory.
-    pub(crate) fn within(
-        normals: Vec<Vec3>,
-        vertices: &VertexMap,
-        region: &Region,
-        rough: &mut Vec<Vec4>,
-    ) -> Self {
-        let (width, height) = (vertices.width, vertices.height);
-        let mut map = Self { width, height, normals };
-        if region.is_empty() {
-            return map;
-        }
-        let columns = region.columns.len();
-        // What is left in it from before is overwritten.
-        rough.resize(columns * region.rows.len(), Vec4::ZERO);
-        rough
-            .par_chunks_mut(columns)
-            .with_min_len(ROWS_A_TASK)
-            .enumerate()
-            .for_each(|(row, normals)| {
-                rough_normals(
-                    vertices,
-                    region.columns.start,
-                    region.rows.start + row,
-                    normals,
-                );
-            });
-        let patch = Patch { rough, columns, rows: region.rows.len() };
-        let rows = region.rows.start * width..region.rows.end * width;
-        map.normals[rows]
-            .par_chunks_mut(width)
-            .with_min_len(ROWS_A_TASK)
-            .enumerate()
-            .for_each(|(row, normals)| patch.smooth(row, &mut normals[region.columns.clone()]));
-        map
-    }
-}
-
-/// Fewer rows are not worth another thread's attention.
-const ROWS_A_TASK: usize = 16;
-
-/// For each pixel of a row from `first` on, a vector along the normal, from the nearest points on the same surface left,
-/// right, above and below, zero where there is none; and the pixel's depth beside it.
-fn rough_normals(vertices: &VertexMap, first: usize, y: usize, normals: &mut [Vec4]) {
-    let (width, height) = (vertices.width, vertices.height);
-    let row = |y: usize| &vertices.points[y * width..(y + 1) * width];
-    let here = row(y);
-    // Beyond the picture there is nothing: a row compared with itself gives no vector.
-    let above = if y >= REACH_PX {
-        row(y - REACH_PX)
-    } else {
-        here
-    };
-    let below = if y + REACH_PX < height {
-        row(y + REACH_PX)
-    } else {
-        here
-    };
-    for (x, normal) in (first..).zip(normals) {
-        let center = here[x];
-        let limit_m = STEP_SHARE * center.z;
-        let on_surface = |point: Vec3| {
-            // A NaN compares as false.
-            if (point.z - center.z).abs() < limit_m {
-                point
-            } else {
-                center
-            }
-        };
-        let left = if x >= REACH_PX {
-            on_surface(here[x - REACH_PX])
-        } else {
-            center
-        };
-        let right = if x + REACH_PX < width {
-            on_surface(here[x + REACH_PX])
-        } else {
-            center
-        };
-        // Right cross down points away from the camera.
-        let vector = (on_surface(below[x]) - on_surface(above[x])).cross(right - left);
-        let vector = if center.z.is_nan() {
-            Vec3::ZERO
-        } else {
-            vector
-        };
-        *normal = vector.extend(center.z);
-    }
-}
-
-/// Rough normals of a region with their depths, ready to be smoothed.
-struct Patch<'a> {
-    rough: &'a [Vec4],
-    columns: usize,
-    rows: usize,
-}
-
-impl Patch<'_> {
-    /// A row of sums over three by three neighbours, two pixels apart, on the same surface. Larger triangles
-    /// count more: they are the ones measured over both sides.
-    fn smooth(&self, y: usize, normals: &mut [Vec3]) {
-        let row = |y: usize| &self.rough[y * self.columns..(y + 1) * self.columns];
-        let here = row(y);
-        let mut near = [here; 3];
-        let mut count = 0;
-        for at in [y.wrapping_sub(REACH_PX), y, y + REACH_PX] {
-            if at < self.rows {
-                near[count] = row(at);
-                count += 1;
-            }
-        }
-        let near = &near[..count];
-        for (x, normal) in normals.iter_mut().enumerate() {
-            let center = here[x].w;
-            *normal = if center.is_nan() {
-                Vec3::NAN
-            } else {
-                let sum = if x >= REACH_PX && x + REACH_PX < self.columns {
-                    sum_of(near, [x - REACH_PX, x, x + REACH_PX], center)
-                } else if x >= REACH_PX {
-                    sum_of(near, [x - REACH_PX, x], center)
-                } else if x + REACH_PX < self.columns {
-                    sum_of(near, [x, x + REACH_PX], center)
-                } else {
-                    sum_of(near, [x], center)
-                };
-                sum.try_normalize().unwrap_or(Vec3::NAN)
-            };
-        }
-    }
-}
-
-/// The vectors at these places whose depth is near this one.
-#[inline]
-fn sum_of<const N: usize>(rows: &[&[Vec4]], places: [usize; N], depth_m: f32) -> Vec3 {
-    let limit_m = STEP_SHARE * depth_m;
-    let mut sum = Vec4::ZERO;
-    for row in rows {
-        for place in places {
-            let vector = row[place];
-            let near = (vector.w - depth_m).abs() < limit_m;
-            sum += if near { vector } else { Vec4::ZERO };
-        }
-    }
-    sum.truncate()
-}
-
 #[cfg(test)]
 mod tests {
-    use effigy_capture::Intrinsics;
-    use glam::vec3;
-
     use super::*;
-
-    const CAMERA: Intrinsics =
-        Intrinsics { width: 160, height: 120, fx: 130.0, fy: 131.0, cx: 80.2, cy: 59.1 };
-
-    fn map_of(depth_at: impl Fn(Vec2) -> f32) -> (DepthMap, Rays) {
-        let rays = Rays::new(&CAMERA.into());
-        let metres = rays
-            .on_unit_plane
-            .iter()
-            .map(|&ray| depth_at(ray))
-            .collect();
-        (DepthMap { width: 160, height: 120, metres }, rays)
-    }
 
     #[test]
     fn zero_and_far_pixels_have_no_depth() {
@@ -328,40 +155,5 @@ mod tests {
         let map = DepthMap::in_metres(&image, 0.001, [0.3, 5.0]);
         assert_eq!(map.valid_count(), 1);
         assert!((map.metres[2] - 1.5).abs() < 1e-6);
-    }
-
-    #[test]
-    fn normals_of_a_slanted_plane_are_exact_and_face_the_camera() {
-        let normal = vec3(0.4, -0.3, -0.8).try_normalize().unwrap();
-        let (depth, rays) = map_of(|ray| -1.2 / normal.dot(ray.extend(1.0)));
-        let normals = NormalMap::from_vertices(&VertexMap::unproject(&depth, &rays));
-        for &found in &normals.normals {
-            assert!(found.dot(normal) > 1.0 - 1e-4, "{found}");
-        }
-    }
-
-    #[test]
-    fn normals_beside_a_step_belong_to_their_own_side() {
-        let (depth, rays) = map_of(|ray| if ray.x < 0.0 { 1.0 } else { 1.4 });
-        let normals = NormalMap::from_vertices(&VertexMap::unproject(&depth, &rays));
-        for &found in &normals.normals {
-            assert!(found.dot(vec3(0.0, 0.0, -1.0)) > 0.9999, "{found}");
-        }
-    }
-
-    #[test]
-    fn missing_points_have_no_normal_and_do_not_disturb_their_neighbours() {
-        let (mut depth, rays) = map_of(|_| 2.0);
-        depth.metres[60 * 160 + 80] = f32::NAN;
-        let normals = NormalMap::from_vertices(&VertexMap::unproject(&depth, &rays));
-        let missing = normals
-            .normals
-            .iter()
-            .filter(|normal| normal.x.is_nan())
-            .count();
-        assert_eq!(missing, 1);
-        let (empty, rays) = map_of(|_| f32::NAN);
-        let normals = NormalMap::from_vertices(&VertexMap::unproject(&empty, &rays));
-        assert!(normals.normals.iter().all(|normal| normal.is_nan()));
     }
 }

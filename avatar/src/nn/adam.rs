@@ -1,12 +1,10 @@
 //! Adam (Kingma & Ba 2015), with a weight's gradient formed as an outer product inside the update.
 
+use effigy_fusion::simd;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::{
-    linear::{Linear, OuterGradient},
-    simd,
-};
+use super::linear::{Linear, OuterGradient};
 
 /// Decay rates and epsilon; MetaAvatar keeps the defaults in every stage.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]

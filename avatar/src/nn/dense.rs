@@ -1,9 +1,10 @@
 //! A linear layer over many rows, with its numbers in a flat parameter vector.
 
+use effigy_fusion::simd;
+
 use super::{
     layout::{Layout, Start},
     matmul::{View, Write, multiply},
-    simd,
 };
 
 /// `y = W x + b`, each row by itself.

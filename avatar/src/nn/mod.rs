@@ -14,7 +14,6 @@ pub(crate) mod layout;
 pub(crate) mod linear;
 pub(crate) mod matmul;
 pub(crate) mod residual;
-pub(crate) mod simd;
 pub mod threads;
 pub(crate) mod unet;
 

@@ -2,10 +2,10 @@
 //!
 //! Arrays hold a tile: `[points, hidden]`, row-major; `w` is omega. Symbols are those of `kernel.rs`.
 
+use effigy_fusion::simd;
 use glam::Vec3;
 
 use super::{config::OMEGA, sincos::sincos};
-use crate::nn::simd;
 
 /// Lanes of a partial sum: one AVX-512 register. The order of additions is the same on every unit.
 const LANES: usize = 16;

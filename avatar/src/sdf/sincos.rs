@@ -63,8 +63,9 @@ fn polynomial<const N: usize>(x: f32, coefficients: [f32; N]) -> f32 {
 
 #[cfg(test)]
 mod tests {
+    use effigy_fusion::simd;
+
     use super::*;
-    use crate::nn::simd;
 
     fn largest_error(limit_rad: f32, unit: simd::Unit) -> f64 {
         let angles: Vec<f32> = (-200_000..=200_000)

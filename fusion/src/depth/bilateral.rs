@@ -11,7 +11,10 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::tolerance::Tolerance;
-use crate::maps::{DepthMap, Region};
+use crate::{
+    maps::{DepthMap, Region},
+    simd,
+};
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -238,11 +241,16 @@ impl Window<'_> {
         self.prepare(row, first..end, sums);
         let start = (row + self.border) * self.stride + self.border + first;
         let centers = &self.filter.padded[start..start + end - first];
-        for tap in &self.filter.taps {
-            let shifted = start as isize + tap.dy * self.stride as isize + tap.dx;
-            let neighbours = &self.filter.padded[shifted as usize..][..end - first];
-            sums.add(tap, centers, neighbours);
-        }
+        simd::run(
+            #[inline(always)]
+            || {
+                for tap in &self.filter.taps {
+                    let shifted = start as isize + tap.dy * self.stride as isize + tap.dx;
+                    let neighbours = &self.filter.padded[shifted as usize..][..end - first];
+                    sums.add(tap, centers, neighbours);
+                }
+            },
+        );
         for (index, (depth, &chosen)) in metres[first..end]
             .iter_mut()
             .zip(&chosen[first..end])
@@ -280,7 +288,8 @@ impl Window<'_> {
 
 impl RowSums {
     /// Adds one neighbour of every pixel; written so that the compiler can do several at a time.
-    #[inline]
+    #[expect(clippy::inline_always, reason = "compiled anew for each vector unit")]
+    #[inline(always)]
     fn add(&mut self, tap: &Tap, centers: &[f32], neighbours: &[f32]) {
         let count = centers.len();
         let (dx, dy, weight) = (tap.dx as f32, tap.dy as f32, tap.weight);

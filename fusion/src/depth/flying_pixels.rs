@@ -4,7 +4,10 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::tolerance::Tolerance;
-use crate::maps::{DepthMap, Region};
+use crate::{
+    maps::{DepthMap, Region},
+    simd,
+};
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -96,11 +99,15 @@ fn count_support(copied: &Copied<'_>, row: usize, limits_m: &[f32], support: &mu
         (2, 2),
     ] {
         let neighbours = line(row + down, right);
-        // Written so that the compiler can do several pixels at a time.
-        for index in 0..count {
-            let near = (neighbours[index] - center[index]).abs() < limits_m[index];
-            support[index] += f32::from(u8::from(near));
-        }
+        simd::run(
+            #[inline(always)]
+            || {
+                for index in 0..count {
+                    let near = (neighbours[index] - center[index]).abs() < limits_m[index];
+                    support[index] += f32::from(u8::from(near));
+                }
+            },
+        );
     }
 }
 

@@ -2,7 +2,10 @@
 
 use glam::{IVec3, Vec3};
 
-use super::{TsdfVolume, block::place_in_block};
+use super::{
+    TsdfVolume,
+    block::{VOXELS, place_in_block},
+};
 use crate::mesh::{TriangleMesh, marching_cubes::marching_cubes_sparse};
 
 impl TsdfVolume {
@@ -11,7 +14,7 @@ impl TsdfVolume {
         let cells = self
             .blocks
             .iter()
-            .flat_map(|block| (0..block.voxels.len()).map(|voxel| block.grid_point(voxel)));
+            .flat_map(|block| (0..VOXELS).map(|voxel| block.grid_point(voxel)));
         let value = |corner: IVec3| self.distance_m(corner);
         let mut mesh = marching_cubes_sparse(cells, value, Vec3::ZERO, self.config.voxel_size_m);
         mesh.compute_normals();
@@ -23,7 +26,7 @@ impl TsdfVolume {
         let Some(&block) = self.index_of.get(&super::block::block_of(at)) else {
             return f32::NAN;
         };
-        let voxel = self.blocks[block as usize].voxels[place_in_block(at)];
+        let voxel = self.blocks[block as usize].voxel(place_in_block(at));
         if voxel.weight < self.config.min_weight {
             f32::NAN
         } else {

@@ -7,14 +7,16 @@
 mod block;
 mod extract;
 mod integrate;
+mod seen;
+mod touch;
 
 use effigy_capture::{CameraModel, Rigid3};
 use glam::IVec3;
 use rustc_hash::FxHashMap;
 use serde::{Deserialize, Serialize};
 
-use self::block::Block;
 pub use self::block::{BLOCK_SIDE, Voxel};
+use self::{block::Block, seen::Seen};
 use crate::maps::{NormalMap, VertexMap};
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -54,11 +56,18 @@ pub struct TsdfVolume {
     config: TsdfConfig,
     blocks: Vec<Block>,
     index_of: FxHashMap<IVec3, u32>,
+    /// Of the view being integrated; kept for the sake of its memory.
+    seen: Seen,
 }
 
 impl TsdfVolume {
     pub fn new(config: TsdfConfig) -> Self {
-        Self { config, blocks: Vec::new(), index_of: FxHashMap::default() }
+        Self {
+            config,
+            blocks: Vec::new(),
+            index_of: FxHashMap::default(),
+            seen: Seen::default(),
+        }
     }
 
     pub fn config(&self) -> &TsdfConfig {
@@ -72,7 +81,7 @@ impl TsdfVolume {
     /// The voxel at a grid point, if its block exists.
     pub fn voxel(&self, at: IVec3) -> Option<Voxel> {
         let block = *self.index_of.get(&block::block_of(at))?;
-        Some(self.blocks[block as usize].voxels[block::place_in_block(at)])
+        Some(self.blocks[block as usize].voxel(block::place_in_block(at)))
     }
 
     /// Forgets everything.

@@ -1,9 +1,8 @@
 //! The nonlinearities, each with its first two derivatives.
 
-use crate::{
-    nn::simd,
-    sdf::{OMEGA, sincos},
-};
+use effigy_fusion::simd;
+
+use crate::sdf::{OMEGA, sincos};
 
 /// Half the width of the smooth ramp's bend: as wide as a softplus of sharpness 100 (`SCANimate`, IGR) bends.
 const BEND: f32 = 0.014;

@@ -5,7 +5,7 @@
 
 /// A vector unit that [`run_at`] can compile a body for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Unit {
+pub enum Unit {
     #[cfg(target_arch = "x86_64")]
     Avx512,
     #[cfg(target_arch = "x86_64")]
@@ -16,7 +16,7 @@ pub(crate) enum Unit {
 impl Unit {
     /// The widest unit of this machine.
     #[inline]
-    pub(crate) fn widest() -> Self {
+    pub fn widest() -> Self {
         #[cfg(target_arch = "x86_64")]
         {
             if Self::Avx512.is_here() {
@@ -31,7 +31,7 @@ impl Unit {
 
     /// Whether this machine has the unit.
     #[inline]
-    pub(crate) fn is_here(self) -> bool {
+    pub fn is_here(self) -> bool {
         match self {
             #[cfg(target_arch = "x86_64")]
             Self::Avx512 => {
@@ -51,7 +51,7 @@ impl Unit {
 /// Runs `body` on the widest unit. Write the closure `#[inline(always)]`, so that it is compiled anew
 /// inside each version.
 #[inline]
-pub(crate) fn run<R>(body: impl FnOnce() -> R) -> R {
+pub fn run<R>(body: impl FnOnce() -> R) -> R {
     run_at(Unit::widest(), body)
 }
 
@@ -64,7 +64,7 @@ pub(crate) fn run<R>(body: impl FnOnce() -> R) -> R {
         reason = "calling code compiled for a vector unit found at run time"
     )
 )]
-pub(crate) fn run_at<R>(unit: Unit, body: impl FnOnce() -> R) -> R {
+pub fn run_at<R>(unit: Unit, body: impl FnOnce() -> R) -> R {
     #[cfg(target_arch = "x86_64")]
     if unit.is_here() {
         match unit {
@@ -91,8 +91,7 @@ fn in_avx2<R>(body: impl FnOnce() -> R) -> R {
 }
 
 /// Every unit this machine has, for tests that hold them to each other.
-#[cfg(test)]
-pub(crate) fn units_here() -> Vec<Unit> {
+pub fn units_here() -> Vec<Unit> {
     #[cfg(target_arch = "x86_64")]
     let all = [Unit::Avx512, Unit::Avx2, Unit::Baseline];
     #[cfg(not(target_arch = "x86_64"))]

@@ -1,0 +1,174 @@
+//! Which blocks a view reaches.
+#![expect(
+    clippy::inline_always,
+    reason = "compiled anew for each vector unit, inside `simd::run`"
+)]
+
+use std::ops::Range;
+
+use glam::{IVec3, Mat3, Vec3};
+use rayon::prelude::*;
+
+use super::{
+    DepthView, TsdfConfig, TsdfVolume,
+    block::{BLOCK_SIDE, Block},
+};
+use crate::{maps::Region, simd};
+
+/// Pixels at once: a register of AVX-512.
+const LANES: usize = 16;
+/// Rows of pixels whose blocks are gathered by one task.
+const ROWS_A_TASK: usize = 16;
+
+impl TsdfVolume {
+    /// Makes the blocks within the truncation of a measured point, and marks them; returns the pixels that count.
+    pub(super) fn touch_blocks(
+        &mut self,
+        view: &DepthView<'_>,
+        weight: &(impl Fn(usize) -> f32 + Sync),
+    ) -> Region {
+        for block in &mut self.blocks {
+            block.in_view = false;
+        }
+        let (width, height) = (view.points.width, view.points.height);
+        let reach = Reach::new(view, &self.config);
+        let tasks: Vec<_> = (0..height.div_ceil(ROWS_A_TASK))
+            .into_par_iter()
+            .map(|task| {
+                let rows = task * ROWS_A_TASK..((task + 1) * ROWS_A_TASK).min(height);
+                reach.along_rows(view, rows, weight)
+            })
+            .collect();
+        let mut pixels = Region { columns: width..0, rows: height..0 };
+        for Touched { blocks, pixels: more } in tasks {
+            pixels.columns = pixels.columns.start.min(more.columns.start)
+                ..pixels.columns.end.max(more.columns.end);
+            pixels.rows =
+                pixels.rows.start.min(more.rows.start)..pixels.rows.end.max(more.rows.end);
+            for at in blocks {
+                let next = self.blocks.len() as u32;
+                let index = *self.index_of.entry(at).or_insert(next);
+                if index == next {
+                    self.blocks.push(Block::new(at));
+                }
+                self.blocks[index as usize].in_view = true;
+            }
+        }
+        pixels
+    }
+}
+
+/// Where along a ray it is looked which blocks are there: before the point, at it, and behind it, near enough to each
+/// other that none that the band meets is passed over.
+struct Reach {
+    /// Turns and scales from metres before the camera to blocks.
+    blocks_from_camera: Mat3,
+    origin: Vec3,
+    offsets_m: Vec<f32>,
+}
+
+/// Blocks, each once, and the pixels that reach them.
+struct Touched {
+    blocks: Vec<IVec3>,
+    pixels: Region,
+}
+
+impl Reach {
+    fn new(view: &DepthView<'_>, config: &TsdfConfig) -> Self {
+        let band_m = config.truncation_voxels * config.voxel_size_m;
+        let blocks_per_m = 1.0 / (BLOCK_SIDE as f32 * config.voxel_size_m);
+        let steps = (2.0 * band_m * blocks_per_m / 0.5).ceil().max(1.0);
+        let offset_m = |step: usize| band_m * (2.0 * step as f32 / steps - 1.0);
+        Self {
+            blocks_from_camera: view.volume_from_camera.rotation_matrix() * blocks_per_m,
+            origin: view.volume_from_camera.translation * blocks_per_m,
+            offsets_m: (0..=steps as usize).map(offset_m).collect(),
+        }
+    }
+
+    fn along_rows(
+        &self,
+        view: &DepthView<'_>,
+        rows: Range<usize>,
+        weight: &(impl Fn(usize) -> f32 + Sync),
+    ) -> Touched {
+        let width = view.points.width;
+        let mut columns = width..0;
+        let mut touched_rows = view.points.height..0;
+        let mut blocks: Vec<IVec3> = Vec::new();
+        // What the pixel before reached: mostly the same.
+        let mut before = vec![[i32::MAX; 3]; self.offsets_m.len()];
+        let mut reached = vec![[[0; LANES]; 3]; self.offsets_m.len()];
+        for y in rows {
+            let row = &view.points.points[y * width..][..width];
+            for (first, points) in (0..).step_by(LANES).zip(row.chunks(LANES)) {
+                if points.iter().all(|point| point.z.is_nan()) {
+                    continue;
+                }
+                simd::run(
+                    #[inline(always)]
+                    || self.reach(points, &mut reached),
+                );
+                for (i, point) in points.iter().enumerate() {
+                    let x = first + i;
+                    if point.z.is_nan() || !counts(weight(y * width + x)) {
+                        continue;
+                    }
+                    columns = columns.start.min(x)..columns.end.max(x + 1);
+                    touched_rows = touched_rows.start.min(y)..y + 1;
+                    for (step, before) in reached.iter().zip(&mut before) {
+                        let block = [step[0][i], step[1][i], step[2][i]];
+                        if block != *before {
+                            *before = block;
+                            blocks.push(IVec3::from_array(block));
+                        }
+                    }
+                }
+            }
+        }
+        blocks.sort_unstable_by_key(IVec3::to_array);
+        blocks.dedup();
+        Touched { blocks, pixels: Region { columns, rows: touched_rows } }
+    }
+
+    /// The blocks that several points' bands are in, axis by axis.
+    #[inline(always)]
+    fn reach(&self, points: &[Vec3], reached: &mut [[[i32; LANES]; 3]]) {
+        let mut place = [[0.0; LANES]; 3];
+        for (i, point) in points.iter().enumerate() {
+            for axis in 0..3 {
+                place[axis][i] = point[axis];
+            }
+        }
+        let [x, y, z] = &place;
+        let mut per_length = [0.0; LANES];
+        for i in 0..LANES {
+            per_length[i] = 1.0 / (x[i] * x[i] + y[i] * y[i] + z[i] * z[i]).sqrt();
+        }
+        for axis in 0..3 {
+            let turn = self.blocks_from_camera.row(axis);
+            for (step, offset_m) in reached.iter_mut().zip(&self.offsets_m) {
+                for i in 0..LANES {
+                    let turned = turn.x * x[i] + turn.y * y[i] + turn.z * z[i];
+                    let along = turned * per_length[i];
+                    step[axis][i] = floor(turned + self.origin[axis] + along * offset_m);
+                }
+            }
+        }
+    }
+}
+
+/// Whether a pixel of this weight has a say.
+pub(super) fn counts(weight: f32) -> bool {
+    weight > 0.0
+}
+
+/// Rounded down, of what is less than four million in size; a whole number may become the one below.
+#[inline(always)]
+fn floor(value: f32) -> i32 {
+    // Where neighbouring floats are 1 apart, adding rounds; a conversion would have to ask what is too large.
+    const WHOLE: f32 = 12_582_912.0;
+    (value - 0.5 + WHOLE)
+        .to_bits()
+        .wrapping_sub(WHOLE.to_bits()) as i32
+}
