@@ -578,6 +578,9 @@ pub(crate) struct EvaluateTrackingArgs {
     /// One person, two outfits, the beginning of each movement
     #[arg(long)]
     pub(crate) quick: bool,
+    /// Also without the cloth term, without visibility, without the temporal term, and by another tracker's recipe
+    #[arg(long)]
+    pub(crate) ablation: bool,
     /// Other people than the test split's: tune on these, never on those
     #[arg(long, value_name = "SEED", value_delimiter = ',')]
     pub(crate) people: Vec<u64>,

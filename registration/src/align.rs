@@ -39,6 +39,10 @@ pub struct EnergyConfig {
     pub cloth_outside_m: f32,
     /// A depth point this far inside the body costs one: clothes are never there, noise and model errors are.
     pub cloth_inside_m: f32,
+    /// What a depth point outside of the body says where clothes span a hollow: crotch and inner thighs.
+    pub say_in_hollows: f32,
+    /// Whether depth is matched with what the camera can see of the body only; otherwise with all that faces alike.
+    pub visible_only: bool,
     /// Farther points belong to something else.
     pub outlier_m: f32,
     /// How far matches reach.
@@ -61,6 +65,8 @@ pub struct EnergyConfig {
     pub temporal_rotation_rad: f32,
     pub temporal_trans_m: f32,
     pub floor_m: f32,
+    /// What each of the feet's vertices is worth that is under the floor.
+    pub floor_weight: f32,
     /// What the lower foot's standing on the floor is worth, and how exactly it does.
     pub standing_weight: f32,
     pub standing_m: f32,
@@ -79,6 +85,8 @@ impl Default for EnergyConfig {
             sole_m: 0.012,
             cloth_outside_m: 0.020,
             cloth_inside_m: 0.008,
+            say_in_hollows: 0.05,
+            visible_only: true,
             outlier_m: 0.08,
             reach_m: 0.12,
             direction_m: 0.08,
@@ -92,6 +100,7 @@ impl Default for EnergyConfig {
             temporal_rotation_rad: 0.12,
             temporal_trans_m: 0.02,
             floor_m: 0.01,
+            floor_weight: 0.05,
             standing_weight: 1.0,
             standing_m: 0.01,
             joint_limit_rad: 0.05,
@@ -115,6 +124,8 @@ pub(crate) struct Context<'a> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Effort {
     pub(crate) rounds: usize,
+    /// Of each round, with the same matches.
+    pub(crate) steps: usize,
     /// Use only every n-th depth point.
     pub(crate) every: usize,
     /// Self-occlusion by drawing, or only by facing.
@@ -191,7 +202,9 @@ pub(crate) fn align(
     while rounds < effort.rounds {
         // What is hidden changes little from round to round, and drawing costs as much as matching.
         if rounds % 2 == 0 {
-            visibility = if effort.drawn_visibility {
+            visibility = if !context.energy.visible_only {
+                Visibility::everything(&body)
+            } else if effort.drawn_visibility {
                 renderer.visibility(&body, &observation.view)
             } else {
                 Visibility::by_facing(&body, camera_in_world(observation).translation)
@@ -200,10 +213,15 @@ pub(crate) fn align(
         let progress = rounds as f32 / (effort.rounds - 1).max(1) as f32;
         evidence.widen = effort.widen + (1.0 - effort.widen) * progress;
         evidence.gather(&body, &visibility, observation, &points, context);
-        let outcome = evidence.with_terms(observation, context, |terms| {
-            take_step(body, terms, &mut damping)
-        });
-        (body, termination) = outcome;
+        for _ in 0..effort.steps {
+            let outcome = evidence.with_terms(observation, context, |terms| {
+                take_step(body, terms, &mut damping)
+            });
+            (body, termination) = outcome;
+            if !termination.may_go_on(SMALLEST_DESCENT) {
+                break;
+            }
+        }
         rounds += 1;
         if !termination.may_go_on(SMALLEST_DESCENT) && progress >= effort.settled_from {
             break;
@@ -274,6 +292,7 @@ impl Evidence {
             },
             standoff_m: energy.cloth_standoff_m,
             hair_m: energy.hair_m,
+            say_in_hollows: energy.say_in_hollows,
             weight: energy.data_weight / self.point_count.max(1) as f32,
         };
         let per_vertex = energy.contradiction_weight / 1000.0;
@@ -298,7 +317,7 @@ impl Evidence {
             vertices: &self.floor_vertices,
             sole_m: energy.sole_m,
             sigma_m: energy.floor_m,
-            weight: 0.05,
+            weight: energy.floor_weight,
         };
         let standing = Standing {
             vertices: &self.soles,

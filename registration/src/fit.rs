@@ -5,10 +5,10 @@ use std::sync::Arc;
 
 use crate::{
     align::{Context, EnergyConfig, Evidence, thinned},
-    correspond::Renderer,
+    correspond::{Renderer, Visibility},
     observe::Observation,
     residual::{ShapePrior, Term as _},
-    solve::{NormalEquations, shorten},
+    solve::{Eliminated, NormalEquations, shorten},
     state::{ALL_UNKNOWNS, BETA_COUNT, BodyState, POSE_UNKNOWNS},
     surface::{PosedSurface, ShapedSurface, Surface},
 };
@@ -23,8 +23,10 @@ pub struct FitConfig {
     pub moments_secs: Vec<f32>,
     /// Frames kept for fitting are at least this far apart.
     pub spacing_secs: f32,
-    /// Rounds of each estimate; each call of the tracker does one.
+    /// Rounds of each estimate.
     pub rounds: usize,
+    /// Frames of a round that are looked at in each call of the tracker: all at once would make it late.
+    pub frames_a_call: usize,
     /// Use only every n-th depth point of the stored frames.
     pub every: usize,
     /// How much the betas' standard normal prior counts, in independent measurements.
@@ -38,6 +40,7 @@ impl Default for FitConfig {
             moments_secs: vec![0.35, 1.2, 2.5, 4.5],
             spacing_secs: 0.12,
             rounds: 6,
+            frames_a_call: 4,
             every: 3,
             shape_prior_weight: 2.0,
         }
@@ -65,6 +68,8 @@ struct StoredView {
 struct Estimate {
     betas: [f32; BETA_COUNT],
     rounds_done: usize,
+    /// Of the round's frames so far.
+    parts: Vec<Option<Eliminated>>,
 }
 
 /// What [`ShapeFit::advance`] needs to know of the frame it is called in.
@@ -117,12 +122,13 @@ impl ShapeFit {
             let due = moment.secs >= config.moments_secs[self.next_moment];
             if due && self.views.len() >= 3.min(config.frames) {
                 self.next_moment += 1;
-                self.running = Some(Estimate { betas: moment.state.betas, rounds_done: 0 });
+                let betas = moment.state.betas;
+                self.running = Some(Estimate { betas, rounds_done: 0, parts: Vec::new() });
             }
             return None;
         }
         let context = Context { energy, predicted: None, grounded, whole: true };
-        self.round(config, &context);
+        self.work(config, &context);
         let running = self.running.as_ref()?;
         if running.rounds_done < config.rounds {
             return None;
@@ -137,6 +143,9 @@ impl ShapeFit {
         for view in &mut self.views {
             view.observation.move_by(new_from_old);
             view.state = view.state.seen_from(new_from_old, pelvis);
+        }
+        if let Some(running) = &mut self.running {
+            running.parts.clear();
         }
     }
 
@@ -168,19 +177,24 @@ impl ShapeFit {
         found.0
     }
 
-    /// One step of the estimate in progress.
-    fn round(&mut self, config: &FitConfig, context: &Context<'_>) {
-        if let Some(running) = &mut self.running {
-            running.rounds_done += 1;
-            let confidence = round(
-                &self.surface,
-                &mut self.views,
-                &mut running.betas,
-                config,
-                context,
-            );
-            self.confidence = confidence.unwrap_or(self.confidence);
+    /// A part of a round of the estimate in progress, or what is left of it.
+    fn work(&mut self, config: &FitConfig, context: &Context<'_>) {
+        let Some(running) = &mut self.running else {
+            return;
+        };
+        let shaped = ShapedSurface::new(&self.surface, running.betas);
+        let open = self.views.iter().skip(running.parts.len());
+        let parts = open
+            .take(config.frames_a_call.max(1))
+            .map(|view| eliminated(view, &shaped, config, context));
+        running.parts.extend(parts);
+        if running.parts.len() < self.views.len() {
+            return;
         }
+        let parts = std::mem::take(&mut running.parts);
+        running.rounds_done += 1;
+        let confidence = step(&shaped, &mut self.views, &parts, &mut running.betas, config);
+        self.confidence = confidence.unwrap_or(self.confidence);
     }
 }
 
@@ -195,41 +209,43 @@ pub(crate) fn fit_one(
     let mut views = [StoredView { observation: observation.clone(), state: *state }];
     let mut betas = state.betas;
     for _ in 0..config.rounds {
-        round(surface, &mut views, &mut betas, config, context);
+        let shaped = ShapedSurface::new(surface, betas);
+        let part = eliminated(&views[0], &shaped, config, context);
+        step(&shaped, &mut views, &[part], &mut betas, config);
     }
     views[0].state
 }
 
-/// One Gauss-Newton step of all poses and the betas: each pose is eliminated from its frame's system. Returns
-/// how certain the betas are then.
-fn round(
-    surface: &Arc<Surface>,
-    views: &mut [StoredView],
-    betas: &mut [f32; BETA_COUNT],
+/// One frame's system without its pose.
+fn eliminated(
+    view: &StoredView,
+    shaped: &ShapedSurface,
     config: &FitConfig,
     context: &Context<'_>,
+) -> Option<Eliminated> {
+    linearise(view, shaped, config, context).eliminate(POSE_UNKNOWNS, RELATIVE_DAMPING, 1e-3)
+}
+
+/// One Gauss-Newton step of all poses and the betas, from each frame's system without its pose. Returns how certain the
+/// betas are then.
+fn step(
+    shaped: &ShapedSurface,
+    views: &mut [StoredView],
+    parts: &[Option<Eliminated>],
+    betas: &mut [f32; BETA_COUNT],
+    config: &FitConfig,
 ) -> Option<[f32; BETA_COUNT]> {
-    let shaped = ShapedSurface::new(surface, *betas);
     let mut sum = NormalEquations::new(BETA_COUNT);
-    let mut eliminated = Vec::with_capacity(views.len());
-    for view in views.iter() {
-        let part = linearise(view, &shaped, config, context).eliminate(
-            POSE_UNKNOWNS,
-            RELATIVE_DAMPING,
-            1e-3,
-        );
-        if let Some(part) = &part {
-            sum.add(&part.rest);
-        }
-        eliminated.push(part);
+    for part in parts.iter().flatten() {
+        sum.add(&part.rest);
     }
-    sum.add(&prior(&shaped, *betas, config));
+    sum.add(&prior(shaped, *betas, config));
     let mut betas_step = sum.solve(RELATIVE_DAMPING, 1e-6)?;
     shorten(&mut betas_step);
     for (beta, &step) in betas.iter_mut().zip(&betas_step) {
         *beta = (*beta + step as f32).clamp(-MOST_UNUSUAL, MOST_UNUSUAL);
     }
-    for (view, part) in views.iter_mut().zip(&eliminated) {
+    for (view, part) in views.iter_mut().zip(parts) {
         if let Some(part) = part {
             let mut step = part.first_step(&betas_step);
             shorten(&mut step);
@@ -258,7 +274,11 @@ fn linearise(
 ) -> NormalEquations {
     let observation = &view.observation;
     let body = PosedSurface::new(shaped, &view.state).with_shape_derivatives();
-    let visibility = Renderer::new(&observation.view).visibility(&body, &observation.view);
+    let visibility = if context.energy.visible_only {
+        Renderer::new(&observation.view).visibility(&body, &observation.view)
+    } else {
+        Visibility::everything(&body)
+    };
     let mut evidence = Evidence::default();
     let points = thinned(&observation.points, config.every);
     evidence.gather(&body, &visibility, observation, &points, context);

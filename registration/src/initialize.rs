@@ -70,6 +70,7 @@ impl Searcher<'_> {
         keep_different(&mut found, self.config.finalists);
         let last = Effort {
             rounds: self.config.final_rounds,
+            steps: 1,
             every: 2,
             drawn_visibility: true,
             widen: 1.5,
@@ -146,8 +147,14 @@ impl Searcher<'_> {
     }
 }
 
-pub(crate) const COARSE: Effort =
-    Effort { rounds: 2, every: 1, drawn_visibility: false, widen: 3.0, settled_from: 1.0 };
+pub(crate) const COARSE: Effort = Effort {
+    rounds: 2,
+    steps: 1,
+    every: 1,
+    drawn_visibility: false,
+    widen: 3.0,
+    settled_from: 1.0,
+};
 
 struct Template {
     joints: &'static [(usize, [f32; 3])],

@@ -23,8 +23,14 @@ pub(crate) fn recover_arms(
     }
     let coarse = Effort { rounds: 4, widen: 2.0, ..COARSE };
     let nearer = searcher.refine(&candidates, searcher.coarse, sight.coarse, &coarse);
-    let fine =
-        Effort { rounds: 6, every: 1, drawn_visibility: true, widen: 1.5, settled_from: 0.5 };
+    let fine = Effort {
+        rounds: 6,
+        steps: 1,
+        every: 1,
+        drawn_visibility: true,
+        widen: 1.5,
+        settled_from: 0.5,
+    };
     let starts: Vec<BodyState> = nearer.iter().take(FINALISTS).map(|a| a.state).collect();
     let found = searcher.refine(&starts, searcher.fine, sight.fine, &fine);
     let found = found

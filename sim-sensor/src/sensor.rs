@@ -12,6 +12,7 @@ use crate::{
     scenario::{Noise, Scenario},
     scene::Scene,
     stranger::StrangerScene,
+    truth::Truth,
 };
 
 #[cfg(test)]
@@ -87,6 +88,14 @@ impl SimulatedSensor {
             depth: Arc::new(DepthImage::new(width, height, raw)?),
             color,
         })
+    }
+
+    /// The truth about what this sensor sees: clothes are simulated once for both. `None` of somebody else's character.
+    pub fn truth(&self) -> Option<Truth> {
+        match &self.actor {
+            Actor::Person(scene) => Some(Truth::of_scene(Scene::clone(scene))),
+            Actor::Stranger(_) => None,
+        }
     }
 
     /// How long the movement takes before it repeats.

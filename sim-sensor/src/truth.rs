@@ -64,6 +64,10 @@ impl Truth {
         Ok(Self { scene: Scene::new(scenario, body)? })
     }
 
+    pub(crate) fn of_scene(scene: Scene) -> Self {
+        Self { scene }
+    }
+
     pub fn person(&self) -> &Person {
         &self.scene.person
     }

@@ -97,13 +97,18 @@ fn a_walking_person_in_close_clothes_is_fitted_to_three_centimetres() {
 
 #[test]
 fn a_body_is_found_at_any_heading_from_its_first_frame() {
-    for start in [20, 50, 80, 110, 140, 160] {
+    let starts: Vec<u64> = (10..170).step_by(10).collect();
+    let mut sum_mm = 0.0;
+    for &start in &starts {
         let scene = Scene::new(Routine::TurnAround, OutfitKind::Demo, start..=start);
-        let (mean_mm, share) = scene.follow();
+        let (error_mm, share) = scene.follow();
         assert_eq!(share, 1.0, "found at frame {start}");
-        // A body that looks the wrong way is off by some 150 mm.
-        assert!(mean_mm < 90.0, "V2V {mean_mm} mm at frame {start}");
+        // A body that looks the wrong way is off by some 150 mm; one seen from the side may have an arm elsewhere.
+        assert!(error_mm < 110.0, "V2V {error_mm} mm at frame {start}");
+        sum_mm += error_mm;
     }
+    let mean_mm = sum_mm / starts.len() as f32;
+    assert!(mean_mm < 35.0, "V2V {mean_mm} mm on average");
 }
 
 #[test]

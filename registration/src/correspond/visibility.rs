@@ -47,6 +47,11 @@ impl Visibility {
         self.visible[vertex as usize]
     }
 
+    /// As if nothing hid anything.
+    pub(crate) fn everything(body: &PosedSurface<'_>) -> Self {
+        Self { visible: vec![true; body.vertices.len()] }
+    }
+
     /// Only by facing the camera: cheap, for the coarse search.
     pub(crate) fn by_facing(body: &PosedSurface<'_>, camera_in_world: Vec3) -> Self {
         let visible = body

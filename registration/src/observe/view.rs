@@ -4,7 +4,7 @@ use effigy_capture::{CameraModel, Intrinsics, Rigid3};
 use effigy_fusion::CleanFrame;
 use glam::{Vec2, Vec3};
 
-use super::distance::nearest_inside;
+use super::distance::Nearest;
 
 /// The person and what surrounds it, in cells of about `cell_m` a side at its distance. Lens distortion is gone: cells are filled
 /// from the measured points, not from pixels.
@@ -14,8 +14,7 @@ pub(crate) struct View {
     pub(crate) pinhole: Intrinsics,
     pub(crate) camera_from_world: Rigid3,
     pub(crate) cells: Vec<Cell>,
-    /// For each cell the nearest cell of the person.
-    nearest_person: Vec<[i16; 2]>,
+    person: Nearest,
     /// Where the sensor's image ends within the view: `[left, top, right, bottom]`, half-open.
     image: [i32; 4],
     /// In the world: what is lower cannot be told from the floor by its depth, so it may be missing from the mask.
@@ -84,14 +83,14 @@ impl View {
             pinhole,
             camera_from_world: world_from_camera.inverse(),
             cells: vec![Cell::default(); pinhole.pixel_count()],
-            nearest_person: Vec::new(),
+            person: Nearest::of(&[], 1),
             image,
             ground_m: f32::MIN,
             noise_m: 0.0,
         };
         view.fill(clean, person.pixels_with_margin(clean, margin_px), scale);
         let inside: Vec<bool> = view.cells.iter().map(|c| c.seen == Seen::Person).collect();
-        view.nearest_person = nearest_inside(&inside, pinhole.width as usize);
+        view.person = Nearest::of(&inside, pinhole.width as usize);
         view.mark_gaps(cell_m);
         Some(view)
     }
@@ -119,8 +118,8 @@ impl View {
         }
         let x = x.clamp(0, self.pinhole.width as i32 - 1) as usize;
         let y = y.clamp(0, self.pinhole.height as i32 - 1) as usize;
-        let [x, y] = self.nearest_person[y * self.pinhole.width as usize + x];
-        Some(Vec2::new(f32::from(x), f32::from(y)))
+        let [x, y] = self.person.to([x, y])?;
+        Some(Vec2::new(x as f32, y as f32))
     }
 
     /// Whether a point on a cell's ray is so low that the sensor would take it for the floor.
@@ -173,18 +172,11 @@ impl View {
     /// Closes the mask: empty cells that a disc of [`GAP_M`] outside the person cannot reach are gaps.
     fn mark_gaps(&mut self, cell_m: f32) {
         let radius = (GAP_M / cell_m).max(1.0);
-        let width = self.pinhole.width as usize;
-        let far = |nearest: &[[i16; 2]], i: usize| {
-            let [x, y] = nearest[i].map(f32::from);
-            Vec2::new(x - (i % width) as f32, y - (i / width) as f32).length() > radius
-        };
-        let outside: Vec<bool> = (0..self.cells.len())
-            .map(|i| far(&self.nearest_person, i))
-            .collect();
-        let nearest_outside = nearest_inside(&outside, width);
-        for i in 0..self.cells.len() {
-            if self.cells[i].seen == Seen::Nothing && far(&nearest_outside, i) {
-                self.cells[i].seen = Seen::Gap;
+        let outside = self.person.farther_than(radius);
+        let closed = Nearest::of(&outside, self.pinhole.width as usize).farther_than(radius);
+        for (cell, closed) in self.cells.iter_mut().zip(closed) {
+            if cell.seen == Seen::Nothing && closed {
+                cell.seen = Seen::Gap;
             }
         }
     }
@@ -203,11 +195,13 @@ impl View {
         let rotation = Quat::from_rotation_x(std::f32::consts::PI - 0.1);
         let pinhole =
             Intrinsics { width: 320, height: 288, fx: 252.0, fy: 252.0, cx: 160.0, cy: 144.0 };
+        let mut first_cell = vec![false; pinhole.pixel_count()];
+        first_cell[0] = true;
         Self {
             pinhole,
             camera_from_world: Rigid3 { rotation, translation: Vec3::new(0.05, 1.0, 0.2) },
             cells: vec![Cell::default(); pinhole.pixel_count()],
-            nearest_person: vec![[0, 0]; pinhole.pixel_count()],
+            person: Nearest::of(&first_cell, 320),
             image: [0, 0, 320, 288],
             ground_m: f32::MIN,
             noise_m: 0.0,

@@ -27,12 +27,11 @@ pub(crate) struct PointToPlane<'a> {
     pub(crate) standoff_m: f32,
     /// The same of hair.
     pub(crate) hair_m: f32,
+    /// Where clothes span a hollow, what is outside of the body says this little about it.
+    pub(crate) say_in_hollows: f32,
     /// How many independent measurements one match is worth: neighbours share their errors.
     pub(crate) weight: f32,
 }
-
-/// Where clothes span a hollow, what is outside of the body says little about it.
-const SAY_IN_HOLLOWS: f32 = 0.05;
 
 impl Term for PointToPlane<'_> {
     fn emit(&self, body: &PosedSurface<'_>, sink: &mut dyn RowSink) {
@@ -45,7 +44,7 @@ impl Term for PointToPlane<'_> {
             let distance_m = found.normal.dot(found.point - body.vertices[vertex]) - standoff_m;
             let (weight, cost) = self.cloth.weight_and_cost(distance_m, found.sigma_m);
             let spanned = distance_m > 0.0 && surface.spanned[vertex];
-            let say = if spanned { SAY_IN_HOLLOWS } else { 1.0 };
+            let say = if spanned { self.say_in_hollows } else { 1.0 };
             let scale = self.weight * found.trust * say;
             row.restart(distance_m, weight * scale, cost * scale);
             if sink.wants_derivatives() {
@@ -81,6 +80,7 @@ mod tests {
             cloth,
             standoff_m: 0.01,
             hair_m: 0.008,
+            say_in_hollows: 0.05,
             weight: 1.0,
         });
     }
@@ -105,8 +105,15 @@ mod tests {
             };
             let mut sum = CostSum::default();
             let cloth = ClothSide { outside: 0.02, inside: 0.02, outlier: 10.0 };
-            PointToPlane { matches: &[found], cloth, standoff_m: 0.0, hair_m: 0.0, weight: 1.0 }
-                .emit(&body, &mut sum);
+            let term = PointToPlane {
+                matches: &[found],
+                cloth,
+                standoff_m: 0.0,
+                hair_m: 0.0,
+                say_in_hollows: 0.05,
+                weight: 1.0,
+            };
+            term.emit(&body, &mut sum);
             sum.0
         };
         assert!(cost(0.03) < 0.1 * cost(-0.03));

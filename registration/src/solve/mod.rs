@@ -4,4 +4,4 @@ mod levenberg_marquardt;
 mod normal_equations;
 
 pub(crate) use levenberg_marquardt::{Damping, Termination, shorten, take_step};
-pub(crate) use normal_equations::NormalEquations;
+pub(crate) use normal_equations::{Eliminated, NormalEquations};

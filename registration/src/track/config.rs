@@ -23,6 +23,8 @@ pub struct TrackConfig {
     pub velocity_share: f32,
     /// Rounds of matching and moving a frame.
     pub rounds: usize,
+    /// Steps of each round, with the matches that it began with.
+    pub steps: usize,
     /// Fewer person pixels are nobody (field practice: re-initialise below 1000).
     pub min_person_px: usize,
     /// Drawn body and picture differ by more than this on average, beyond the sensor's noise: the track is bad.
@@ -55,6 +57,7 @@ impl Default for TrackConfig {
             normal_error_rad: 0.0,
             velocity_share: 0.4,
             rounds: 7,
+            steps: 1,
             min_person_px: 1000,
             bad_error_m: 0.055,
             found_error_m: 0.05,

@@ -87,6 +87,7 @@ impl Tracker {
         self.shaped = self.dressed(&self.surface, fitted.betas);
         let effort = Effort {
             rounds: self.config.rounds,
+            steps: self.config.steps,
             every: 1,
             drawn_visibility: true,
             widen: 1.0,

@@ -102,6 +102,7 @@ impl Tracker {
         let context = Context { whole, ..self.context(Some(&predicted)) };
         let effort = Effort {
             rounds: self.config.rounds,
+            steps: self.config.steps,
             every: 1,
             drawn_visibility: true,
             widen: 2.0,

@@ -43,6 +43,7 @@ impl Tracker {
             let context = Context { energy: &self.energy, predicted: None, grounded, whole: true };
             let effort = Effort {
                 rounds: self.config.rounds,
+                steps: self.config.steps,
                 every: 2,
                 drawn_visibility: true,
                 widen: 1.0,

@@ -29,6 +29,7 @@ impl Tracker {
             sole_m: 0.0,
             cloth_outside_m: KNOWN_TO_M,
             cloth_inside_m: KNOWN_TO_M,
+            say_in_hollows: 1.0,
             ..self.config.energy
         };
         self.shaped = self.dressed(&self.surface, self.shaped.betas);

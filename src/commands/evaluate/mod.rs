@@ -9,7 +9,7 @@ use effigy_registration::smpl::builtin;
 use serde::Serialize;
 
 pub(crate) use self::avatar::{HEADLINE_SEEDS, Method, Table};
-use self::tracking::Suite;
+use self::tracking::{Suite, Variant};
 use crate::{
     cli::{EvaluateArgs, EvaluateTrackingArgs, EvaluateWhat, Protocol},
     files, interrupt,
@@ -46,16 +46,27 @@ fn evaluate_tracking(args: &EvaluateTrackingArgs) -> anyhow::Result<()> {
     files::check_writable(&args.json)?;
     let settings = Settings::load(args.config.as_deref())?;
     let cases = suite(args).cases();
-    let progress = Progress::new("tracking", Some(cases.len() as u64));
-    let table = tracking::evaluate(
-        &cases,
-        &builtin::body(),
-        &tracking::Options { clean: settings.clean, track: settings.track },
-        &|done| {
-            progress.advance(done as u64);
-            !interrupt::requested()
-        },
-    )?;
+    let variants: &[Variant] = if args.ablation {
+        &Variant::ALL
+    } else {
+        &[Variant::Default]
+    };
+    let count = cases.len() * variants.len();
+    let progress = Progress::new("tracking", Some(count as u64));
+    let options = tracking::Options { clean: settings.clean, track: settings.track };
+    let mut table = tracking::Table::default();
+    for (number, variant) in variants.iter().enumerate() {
+        let before = number * cases.len();
+        table.append(tracking::evaluate(
+            &cases,
+            &builtin::body(),
+            (*variant, &options),
+            &|done| {
+                progress.advance((before + done) as u64);
+                !interrupt::requested()
+            },
+        )?);
+    }
     progress.finish();
     say!("{}", table.to_string().trim_end());
     let report =
@@ -78,6 +89,7 @@ fn suite(args: &EvaluateTrackingArgs) -> Suite {
     }
     if !args.outfit.is_empty() {
         suite.outfits.clone_from(&args.outfit);
+        suite.in_cloth.clear();
     }
     suite
 }

@@ -26,7 +26,8 @@ pub(super) fn follow(
 ) -> anyhow::Result<CaseScores> {
     let mut sensor = SimulatedSensor::new(&case.scenario, Arc::clone(body))?;
     let calibration = effigy_capture::FrameSource::calibration(&sensor).clone();
-    let mut reality = Reality::new(case, body, calibration.depth.intrinsics)?;
+    let truth = sensor.truth();
+    let mut reality = Reality::new(case, body, calibration.depth.intrinsics, truth)?;
     let mut chain = Chain {
         cleaner: Cleaner::new(calibration.clone(), options.clean.clone()),
         // Where the camera stands is not told: the floor is found as on any other recording.
@@ -69,14 +70,19 @@ enum Reality<'a> {
 }
 
 impl<'a> Reality<'a> {
-    fn new(case: &Case, body: &'a Arc<BodyModel>, camera: Intrinsics) -> anyhow::Result<Self> {
+    /// `person` is the truth about one of our own; others bring theirs along.
+    fn new(
+        case: &Case,
+        body: &'a Arc<BodyModel>,
+        camera: Intrinsics,
+        person: Option<Truth>,
+    ) -> anyhow::Result<Self> {
         let judge = Judge::new(body, camera);
-        if case.scenario.stranger.is_some() {
-            let truth = StrangerTruth::new(&case.scenario)?;
-            return Ok(Self::Stranger(Box::new(StrangerJudge::new(judge, truth))));
+        if let Some(truth) = person {
+            return Ok(Self::Person { judge: Box::new(judge), truth: Box::new(truth) });
         }
-        let truth = Box::new(Truth::new(&case.scenario, Arc::clone(body))?);
-        Ok(Self::Person { judge: Box::new(judge), truth })
+        let truth = StrangerTruth::new(&case.scenario)?;
+        Ok(Self::Stranger(Box::new(StrangerJudge::new(judge, truth))))
     }
 
     fn score(

@@ -8,9 +8,11 @@ mod statistics;
 mod strangers;
 mod suite;
 mod table;
+mod variant;
 
 pub(crate) use suite::{Case, Suite};
 pub(crate) use table::Table;
+pub(crate) use variant::Variant;
 
 use std::{
     sync::{
@@ -37,9 +39,10 @@ pub(crate) struct Options {
 pub(crate) fn evaluate(
     cases: &[Case],
     body: &Arc<BodyModel>,
-    options: &Options,
+    (variant, options): (Variant, &Options),
     go_on: &(dyn Fn(usize) -> bool + Sync),
 ) -> anyhow::Result<Table> {
+    let options = &variant.of(options);
     let next = AtomicUsize::new(0);
     let finished = AtomicUsize::new(0);
     let work = || -> anyhow::Result<Vec<(usize, CaseScores)>> {
@@ -74,5 +77,5 @@ pub(crate) fn evaluate(
     let scored = scores
         .into_iter()
         .map(|(index, score)| (&cases[index], score));
-    Ok(Table::new(scored))
+    Ok(Table::new(variant, scored))
 }

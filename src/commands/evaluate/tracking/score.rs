@@ -5,7 +5,10 @@ use effigy_fusion::mesh::{
     TriangleMesh,
     z_buffer::{Faces, Raster, Rasterizer},
 };
-use effigy_registration::{BodyModel, BodyParams, RegisteredFrame, Tracking, smpl::JOINT_COUNT};
+use effigy_registration::{
+    BodyModel, BodyParams, RegisteredFrame, Tracking,
+    smpl::{JOINT_COUNT, VertexWeights},
+};
 use effigy_sim_sensor::GroundTruth;
 use glam::Vec3;
 
@@ -122,6 +125,10 @@ impl<'a> Judge<'a> {
         milliseconds: f32,
     ) -> FrameScore {
         let truth_from_found = truth.world_from_camera * registered.world_from_camera.inverse();
+        if let Some(cloth) = &truth.in_cloth {
+            self.parts = cloth.weights.iter().map(VertexWeights::main_bone).collect();
+        }
+        let observed = self.observed(&truth.clothed_in_world, truth.world_from_camera);
         let errors =
             |params: Option<&BodyParams>| Some(self.errors(params?, truth_from_found, truth));
         FrameScore {
@@ -132,7 +139,7 @@ impl<'a> Judge<'a> {
             measured: [true; JOINT_COUNT],
             errors: errors(registered.params()),
             smooth_errors: errors(smooth),
-            observed: self.observed(&truth.clothed_in_world, truth.world_from_camera),
+            observed,
         }
     }
 

@@ -49,9 +49,12 @@ pub(crate) struct Suite {
     pub(crate) people: Vec<u64>,
     pub(crate) sensors: Vec<SensorPreset>,
     pub(crate) outfits: Vec<OutfitKind>,
+    /// Simulated clothes, which take their time: in these nobody is lost and nobody stands still.
+    pub(crate) in_cloth: Vec<OutfitKind>,
     pub(crate) motions: Vec<Routine>,
     /// Movements are cut after this.
     pub(crate) most_secs: f32,
+    pub(crate) most_secs_in_cloth: f32,
     /// Long enough for the shape to settle and for jitter to be measured after it; 0 for no stand.
     pub(crate) stand_secs: f32,
     /// Losses of each person in each outfit before each sensor.
@@ -136,8 +139,15 @@ impl Suite {
                 OutfitKind::Sport,
                 OutfitKind::Loose,
             ],
+            in_cloth: vec![
+                OutfitKind::TshirtTrousers,
+                OutfitKind::LongsleeveWideTrousers,
+                OutfitKind::HoodieTrousers,
+                OutfitKind::Skirt,
+            ],
             motions: movements.collect(),
             most_secs: 8.0,
+            most_secs_in_cloth: 4.0,
             stand_secs: 7.0,
             losses: 5,
             data: PathBuf::from(DATA),
@@ -149,6 +159,7 @@ impl Suite {
         Self {
             people: TEST_PEOPLE[..1].to_vec(),
             outfits: vec![OutfitKind::CloseFitting, OutfitKind::Loose],
+            in_cloth: Vec::new(),
             most_secs: 2.5,
             stand_secs: 3.5,
             losses: 2,
@@ -160,7 +171,7 @@ impl Suite {
     pub(crate) fn cases(&self) -> Vec<Case> {
         let mut cases = Vec::new();
         for &sensor in &self.sensors {
-            for &outfit in &self.outfits {
+            for &outfit in self.outfits.iter().chain(&self.in_cloth) {
                 for &seed in &self.people {
                     let scenario = Scenario { seed, sensor, outfit, ..Scenario::default() };
                     self.perform(&scenario, &mut cases);
@@ -229,8 +240,17 @@ impl Suite {
             },
             purpose,
         };
+        let in_cloth = scenario.outfit.cloth().is_some();
+        let most_secs = if in_cloth {
+            self.most_secs.min(self.most_secs_in_cloth)
+        } else {
+            self.most_secs
+        };
         for &routine in &self.motions {
-            cases.push(case(routine, self.most_secs, Purpose::Accuracy));
+            cases.push(case(routine, most_secs, Purpose::Accuracy));
+        }
+        if in_cloth {
+            return;
         }
         if self.stand_secs > 0.0 {
             cases.push(case(Routine::Stand, self.stand_secs, Purpose::Stillness));

@@ -8,6 +8,7 @@ use super::{
     score::{BodyErrors, CaseScores, FrameScore, State},
     statistics::{mean, percentile, root_mean_square, share},
     suite::{Case, Purpose},
+    variant::Variant,
 };
 
 /// A joint within this of the true one is a hit.
@@ -18,7 +19,7 @@ const REACQUIRED_WITHIN_SECS: f32 = 0.5;
 const NEVER_SECS: f32 = 99.0;
 
 /// What an evaluation found.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Default, Serialize)]
 pub(crate) struct Table {
     rows: Vec<Row>,
     runs: Vec<Run>,
@@ -27,6 +28,7 @@ pub(crate) struct Table {
 /// One sensor and outfit; figures that nothing was measured for are `null`.
 #[derive(Clone, Debug, Default, Serialize)]
 struct Row {
+    variant: &'static str,
     suite: &'static str,
     sensor: &'static str,
     outfit: &'static str,
@@ -71,7 +73,10 @@ struct Run {
 
 impl Table {
     /// Rows in the order in which their first case comes.
-    pub(super) fn new<'a>(scored: impl Iterator<Item = (&'a Case, CaseScores)>) -> Self {
+    pub(super) fn new<'a>(
+        variant: Variant,
+        scored: impl Iterator<Item = (&'a Case, CaseScores)>,
+    ) -> Self {
         let scored: Vec<(&Case, CaseScores)> = scored.collect();
         let mut keys: Vec<Key> = Vec::new();
         for (case, _) in &scored {
@@ -79,10 +84,11 @@ impl Table {
                 keys.push(Key::of(case));
             }
         }
+        let variant = variant.name();
         let of_key = |key: &Key| {
             let members = scored.iter().filter(|(case, _)| Key::of(case) == *key);
             Row::new(
-                key,
+                (variant, key),
                 &members
                     .map(|(case, scores)| (*case, scores))
                     .collect::<Vec<_>>(),
@@ -91,9 +97,14 @@ impl Table {
         let run = |(case, scores): &(&Case, CaseScores)| Run {
             motion: case.motion_name(),
             person: case.scenario.seed,
-            figures: Row::new(&Key::of(case), &[(*case, scores)]),
+            figures: Row::new((variant, &Key::of(case)), &[(*case, scores)]),
         };
         Self { rows: keys.iter().map(of_key).collect(), runs: scored.iter().map(run).collect() }
+    }
+
+    pub(crate) fn append(&mut self, other: Self) {
+        self.rows.extend(other.rows);
+        self.runs.extend(other.runs);
     }
 }
 
@@ -112,8 +123,9 @@ impl Key {
 }
 
 impl Row {
-    fn new(key: &Key, cases: &[(&Case, &CaseScores)]) -> Self {
+    fn new((variant, key): (&'static str, &Key), cases: &[(&Case, &CaseScores)]) -> Self {
         let row = Self {
+            variant,
             suite: key.suite,
             sensor: key.sensor,
             outfit: key.outfit,
@@ -267,18 +279,17 @@ fn wrist_jitter_mm(frames: &[FrameScore], of: fn(&FrameScore) -> Option<&BodyErr
 
 impl fmt::Display for Table {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{:<40}", "")?;
+        write!(f, "{:<60}", "")?;
         for column in Row::default().columns() {
             write!(f, "{:>9}", column.title)?;
         }
         writeln!(f)?;
         for row in &self.rows {
-            row.write_line(f, &format!("{} {}", row.sensor, row.outfit))?;
+            row.write_line(f, &row.name())?;
         }
         writeln!(f)?;
         for Run { motion, person, figures } in &self.runs {
-            let Row { sensor, outfit, .. } = figures;
-            figures.write_line(f, &format!("{sensor} {outfit} {motion} {person}"))?;
+            figures.write_line(f, &format!("{} {motion} {person}", figures.name()))?;
         }
         Ok(())
     }
@@ -291,6 +302,15 @@ struct Column {
 }
 
 impl Row {
+    fn name(&self) -> String {
+        let Self { variant, sensor, outfit, .. } = self;
+        if *variant == Variant::Default.name() {
+            format!("{sensor} {outfit}")
+        } else {
+            format!("{variant} {sensor} {outfit}")
+        }
+    }
+
     fn columns(&self) -> [Column; 20] {
         let of = |title, value, decimals| Column { title, value, decimals };
         [
@@ -318,7 +338,7 @@ impl Row {
     }
 
     fn write_line(&self, f: &mut fmt::Formatter<'_>, name: &str) -> fmt::Result {
-        write!(f, "{name:<40}")?;
+        write!(f, "{name:<60}")?;
         for Column { value, decimals, .. } in self.columns() {
             match value {
                 Some(value) => write!(f, "{value:>9.decimals$}")?,
