@@ -203,6 +203,22 @@ pub(crate) struct ChainArgs {
     /// Settings of the stages (TOML); what it does not name keeps its default
     #[arg(long, value_name = "FILE")]
     pub(crate) config: Option<PathBuf>,
+    /// Of several people follow the one at this place in the picture, from 0,0 at its top left to 1,1, instead of the
+    /// nearest
+    #[arg(long, value_name = "X,Y", value_parser = place_in_picture)]
+    pub(crate) pick: Option<[f32; 2]>,
+}
+
+/// As `--pick` has it.
+fn place_in_picture(text: &str) -> Result<[f32; 2], String> {
+    let share = |text: &str| {
+        let number = text.trim().parse::<f32>().ok();
+        number.filter(|share| (0.0..=1.0).contains(share))
+    };
+    let place = text
+        .split_once(',')
+        .and_then(|(x, y)| Some([share(x)?, share(y)?]));
+    place.ok_or_else(|| "expected two numbers from 0 to 1, as in 0.3,0.5".to_owned())
 }
 
 impl ChainArgs {
@@ -221,6 +237,7 @@ impl ChainArgs {
             exit_after: None,
             body: None,
             config: None,
+            pick: None,
         }
     }
 }

@@ -16,6 +16,7 @@ use crate::{
     },
     error::FusionError,
     maps::{DepthMap, NormalMap, Rays, Region, VertexMap},
+    normals::reach_px,
 };
 
 /// One frame's clean geometry in the depth camera's space; all maps have one size.
@@ -133,10 +134,12 @@ impl Cleaner {
         let mut depth = DepthMap::in_metres_into(depth, &frame.depth, scale, range_m);
         let Segmentation { mut person, region, floor, visibility, bodies } =
             self.segmenter.segment(&depth, &self.rays, &self.tolerance);
+        let person_m = bodies.first().map_or(f32::NAN, |body| body.centroid.z);
         self.bodies = bodies;
         let filled = self.clean_person(&mut depth, &mut person, &region);
         let vertices = self.unproject_person(points, &depth, &person, &region);
-        let normals = NormalMap::within(normals, &vertices, &region);
+        let reach = self.reach_px(person_m);
+        let normals = NormalMap::within(normals, &vertices, &region, reach);
         let sigma_m = self.sigma(sigma_m, (&vertices, &normals), &region, &filled);
         let (id, timestamp) = (frame.id, frame.timestamp);
         Ok(CleanFrame {
@@ -184,9 +187,26 @@ impl Cleaner {
         })
     }
 
+    /// From the next frame on follows whoever is nearest to a place in the picture, from `[0, 0]` at its top left to
+    /// `[1, 1]`.
+    pub fn pick(&mut self, place: [f32; 2]) {
+        self.segmenter.pick(place);
+    }
+
     /// Everything in the last frame with a body's measures, the person being followed first.
     pub fn bodies(&self) -> &[Body] {
         &self.bodies
+    }
+
+    /// How far normals reach at somebody's distance: farther where depth is noisy.
+    fn reach_px(&self, person_m: f32) -> usize {
+        if person_m.is_nan() {
+            return reach_px(0.0, 1.0);
+        }
+        reach_px(
+            self.tolerance.sigma_m(person_m),
+            self.tolerance.pixel_size_m(person_m),
+        )
     }
 
     fn check_size(&self, frame: &Frame) -> Result<(), FusionError> {

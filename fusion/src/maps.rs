@@ -74,6 +74,13 @@ impl Rays {
         }
     }
 
+    /// The ray through a place in the picture, from `[0, 0]` at its top left to `[1, 1]`.
+    pub(crate) fn at(&self, [x, y]: [f32; 2]) -> Vec2 {
+        let pixel =
+            |share: f32, size: usize| ((share * size as f32) as usize).min(size.saturating_sub(1));
+        self.on_unit_plane[pixel(y, self.height) * self.width + pixel(x, self.width)]
+    }
+
     pub fn point(&self, pixel: usize, depth_m: f32) -> Vec3 {
         self.on_unit_plane[pixel].extend(1.0) * depth_m
     }

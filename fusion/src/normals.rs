@@ -15,17 +15,18 @@ use crate::{
     simd,
 };
 
-/// Neighbours whose depths differ by more than this share of the depth lie on different surfaces: a surface
-/// seen at 75 degrees changes by 1.5 % between the pixels compared here, and noise adds the rest.
+/// Neighbours two pixels apart whose depths differ by more than this share of the depth lie on different surfaces: a
+/// surface seen at 75 degrees changes by 1.5 % between them, and noise adds the rest.
 const STEP_SHARE: f32 = 0.025;
-/// Pixels between the neighbours a normal is computed from, to either side.
-const REACH_PX: usize = 2;
-/// Rows that one task computes; it looks at four more on either side.
+/// Pixels between the neighbours a normal is computed from, to either side: as few as this, and as many.
+const REACH_PX: std::ops::RangeInclusive<usize> = 2..=5;
+/// Neighbours are this many standard deviations of depth apart, so that noise turns normals by no more than it does for a
+/// quiet sensor.
+const REACH_SIGMAS: f32 = 1.5;
+/// Rows that one task computes; it looks at twice the reach more on either side.
 const ROWS_A_TASK: usize = 32;
 /// Pixels computed at once: a register of AVX-512.
 const LANES: usize = 16;
-/// Rows that are needed at a time: one, and those that are looked at above and below.
-const ROWS_KEPT: usize = 2 * REACH_PX + 1;
 
 thread_local! {
     /// Working memory, some 100 kB.
@@ -37,11 +38,17 @@ impl NormalMap {
     /// not bridged. NaN where there is no point, or where it has no neighbours.
     pub fn from_vertices(vertices: &VertexMap) -> Self {
         let whole = Region::whole(vertices.width, vertices.height);
-        Self::within(vec![Vec3::NAN; vertices.points.len()], vertices, &whole)
+        let nothing = vec![Vec3::NAN; vertices.points.len()];
+        Self::within(nothing, vertices, &whole, *REACH_PX.start())
     }
 
-    /// As [`Self::from_vertices`] within a region, in memory that is NaN as yet.
-    pub(crate) fn within(normals: Vec<Vec3>, vertices: &VertexMap, region: &Region) -> Self {
+    /// As [`Self::from_vertices`] within a region, in memory that is NaN as yet, from neighbours `reach` pixels away.
+    pub(crate) fn within(
+        normals: Vec<Vec3>,
+        vertices: &VertexMap,
+        region: &Region,
+        reach: usize,
+    ) -> Self {
         let (width, height) = (vertices.width, vertices.height);
         let mut map = Self { width, height, normals };
         if region.is_empty() {
@@ -53,7 +60,7 @@ impl NormalMap {
             .enumerate()
             .for_each(|(task, strip)| {
                 let first = region.rows.start + task * ROWS_A_TASK;
-                let sight = Sight { vertices, region };
+                let sight = Sight { vertices, region, reach };
                 KEPT.with_borrow_mut(|kept| {
                     simd::run(
                         #[inline(always)]
@@ -65,16 +72,33 @@ impl NormalMap {
     }
 }
 
+/// The share for neighbours as far apart as this. Those far apart are of a noisy sensor, and 4 % of 2 m are an arm's
+/// thickness: not more.
+fn step_share(reach: usize) -> f32 {
+    let farther = reach as f32 / *REACH_PX.start() as f32;
+    STEP_SHARE * farther.min(1.6)
+}
+
 /// What is looked at.
 struct Sight<'a> {
     vertices: &'a VertexMap,
     region: &'a Region,
+    reach: usize,
+}
+
+/// How far apart neighbours should be where depth is as noisy as this, in pixels of this size there.
+pub(crate) fn reach_px(sigma_m: f32, pixel_m: f32) -> usize {
+    // NaN becomes 0.
+    let wanted = (REACH_SIGMAS * sigma_m / pixel_m).round() as usize;
+    wanted.clamp(*REACH_PX.start(), *REACH_PX.end())
 }
 
 /// A few rows of points and of rough normals, axis by axis, so that several pixels are handled at a time. Row `y` is
-/// in place `y` modulo [`ROWS_KEPT`]; before its first column and after its last come [`REACH_PX`] more, and it is
+/// in place `y` modulo the number of rows kept; before its first column and after its last come `reach` more, and it is
 /// filled up to whole [`LANES`].
 struct Kept {
+    reach: usize,
+    step_share: f32,
     stride: usize,
     /// NaN where there is none.
     points: [Vec<f32>; 3],
@@ -83,15 +107,20 @@ struct Kept {
 }
 
 impl Kept {
-    const EMPTY: Self =
-        Self { stride: 0, points: [const { Vec::new() }; 3], rough: [const { Vec::new() }; 4] };
+    const EMPTY: Self = Self {
+        reach: 0,
+        step_share: 0.0,
+        stride: 0,
+        points: [const { Vec::new() }; 3],
+        rough: [const { Vec::new() }; 4],
+    };
 
     /// The normals of whole rows from `first` on, within the region's columns.
     #[inline(always)]
     fn compute_strip(&mut self, sight: &Sight<'_>, first: usize, strip: &mut [Vec3]) {
         let (width, columns) = (sight.vertices.width, sight.region.columns.clone());
-        self.make_room(columns.len());
-        let (reach, first) = (REACH_PX as isize, first as isize);
+        self.make_room(columns.len(), sight.reach);
+        let (reach, first) = (sight.reach as isize, first as isize);
         for y in first - 2 * reach..first {
             self.take_points(sight, y);
         }
@@ -105,20 +134,21 @@ impl Kept {
         }
     }
 
-    fn make_room(&mut self, columns: usize) {
-        let stride = columns.next_multiple_of(LANES) + 2 * REACH_PX;
-        self.stride = stride;
+    fn make_room(&mut self, columns: usize, reach: usize) {
+        let stride = columns.next_multiple_of(LANES) + 2 * reach;
+        (self.reach, self.stride) = (reach, stride);
+        self.step_share = step_share(reach);
         for axis in self.points.iter_mut().chain(&mut self.rough) {
             // Whatever is left from before is overwritten, but for the columns beside a row: nothing is there.
             axis.clear();
-            axis.resize(ROWS_KEPT * stride, f32::NAN);
+            axis.resize((2 * reach + 1) * stride, f32::NAN);
         }
     }
 
     /// Where a row begins, with its columns beside it.
     #[inline(always)]
     fn start(&self, y: isize) -> usize {
-        y.rem_euclid(ROWS_KEPT as isize) as usize * self.stride
+        y.rem_euclid(2 * self.reach as isize + 1) as usize * self.stride
     }
 
     /// Points beyond the region count as well, beyond the picture there are none.
@@ -134,9 +164,9 @@ impl Kept {
             return;
         }
         let points = &sight.vertices.points[y as usize * width..][..width];
-        let before = columns.start.min(REACH_PX);
+        let before = columns.start.min(self.reach);
         let points = &points[columns.start - before..];
-        let offset = REACH_PX - before;
+        let offset = self.reach - before;
         let count = points.len().min(self.stride - offset);
         let points = &points[..count];
         zs[..offset].fill(f32::NAN);
@@ -164,28 +194,29 @@ impl Kept {
             return;
         }
         let (above, below) = (
-            self.start(y - REACH_PX as isize),
-            self.start(y + REACH_PX as isize),
+            self.start(y - self.reach as isize),
+            self.start(y + self.reach as isize),
         );
-        for x in (REACH_PX..REACH_PX + columns).step_by(LANES) {
+        for x in (self.reach..self.reach + columns).step_by(LANES) {
             let center = self.points_at(start + x);
             write(&mut self.rough[3], start + x, center[2]);
             if all_nan(&center[2]) {
                 continue;
             }
             let [left, right, above, below] = [
-                start + x - REACH_PX,
-                start + x + REACH_PX,
+                start + x - self.reach,
+                start + x + self.reach,
                 above + x,
                 below + x,
             ];
+            let share = self.step_share;
             let across = difference(
-                &pick_near(&self.points_at(right), &center),
-                &pick_near(&self.points_at(left), &center),
+                &pick_near(&self.points_at(right), &center, share),
+                &pick_near(&self.points_at(left), &center, share),
             );
             let down = difference(
-                &pick_near(&self.points_at(below), &center),
-                &pick_near(&self.points_at(above), &center),
+                &pick_near(&self.points_at(below), &center, share),
+                &pick_near(&self.points_at(above), &center, share),
             );
             // Right cross down points away from the camera.
             let normal = cross(&down, &across);
@@ -194,24 +225,24 @@ impl Kept {
             }
         }
         // What fills the row up has no say, nor have points beyond the region.
-        self.rough[3][start + REACH_PX + columns..start + self.stride].fill(f32::NAN);
+        self.rough[3][start + self.reach + columns..start + self.stride].fill(f32::NAN);
     }
 
-    /// A row of sums over three by three neighbours, two pixels apart, on the same surface. Larger triangles
+    /// A row of sums over three by three neighbours, as far apart, on the same surface. Larger triangles
     /// count more: they are the ones measured over both sides.
     #[inline(always)]
     fn smooth(&self, y: isize, normals: &mut [Vec3]) {
-        let reach = REACH_PX as isize;
+        let reach = self.reach as isize;
         let rows = [y - reach, y, y + reach].map(|y| self.start(y));
-        for (normals, x) in normals.chunks_mut(LANES).zip((REACH_PX..).step_by(LANES)) {
+        for (normals, x) in normals.chunks_mut(LANES).zip((self.reach..).step_by(LANES)) {
             let center: Lanes = *lanes(&self.rough[3], rows[1] + x);
             if all_nan(&center) {
                 continue;
             }
             let mut sum = [[0.0; LANES]; 3];
             for row in rows {
-                for at in [row + x - REACH_PX, row + x, row + x + REACH_PX] {
-                    let near = near(lanes(&self.rough[3], at), &center);
+                for at in [row + x - self.reach, row + x, row + x + self.reach] {
+                    let near = near(lanes(&self.rough[3], at), &center, self.step_share);
                     for axis in 0..3 {
                         let vector = lanes(&self.rough[axis], at);
                         for i in 0..LANES {
@@ -253,11 +284,11 @@ fn all_nan(values: &Lanes) -> bool {
 
 /// All bits where a depth is on the center's surface, none elsewhere.
 #[inline(always)]
-fn near(depth: &Lanes, center: &Lanes) -> [u32; LANES] {
+fn near(depth: &Lanes, center: &Lanes, step_share: f32) -> [u32; LANES] {
     let mut near = [0; LANES];
     for i in 0..LANES {
         // A NaN compares as false.
-        let is_near = (depth[i] - center[i]).abs() < STEP_SHARE * center[i];
+        let is_near = (depth[i] - center[i]).abs() < step_share * center[i];
         near[i] = u32::from(is_near).wrapping_neg();
     }
     near
@@ -265,8 +296,8 @@ fn near(depth: &Lanes, center: &Lanes) -> [u32; LANES] {
 
 /// The points on the centers' surfaces, and the centers themselves elsewhere.
 #[inline(always)]
-fn pick_near(points: &[Lanes; 3], center: &[Lanes; 3]) -> [Lanes; 3] {
-    let near = near(&points[2], &center[2]);
+fn pick_near(points: &[Lanes; 3], center: &[Lanes; 3], step_share: f32) -> [Lanes; 3] {
+    let near = near(&points[2], &center[2], step_share);
     let mut picked = *center;
     for axis in 0..3 {
         for i in 0..LANES {
@@ -385,13 +416,14 @@ mod tests {
     }
 
     /// What the strips compute, one pixel at a time.
-    fn plainly(vertices: &VertexMap, region: &Region) -> Vec<Vec3> {
-        let (width, reach) = (vertices.width as isize, REACH_PX as isize);
+    fn plainly(vertices: &VertexMap, region: &Region, reach: usize) -> Vec<Vec3> {
+        let share = step_share(reach);
+        let (width, reach) = (vertices.width as isize, reach as isize);
         let point = |x: isize, y: isize| {
             let inside = (0..width).contains(&x) && (0..vertices.height as isize).contains(&y);
             inside.then(|| vertices.points[(y * width + x) as usize])
         };
-        let near = |point: &Vec3, center: Vec3| (point.z - center.z).abs() < STEP_SHARE * center.z;
+        let near = |point: &Vec3, center: Vec3| (point.z - center.z).abs() < share * center.z;
         let rough = |x: isize, y: isize| {
             let (columns, rows) = (&region.columns, &region.rows);
             let inside = columns.contains(&(x as usize)) && rows.contains(&(y as usize));
@@ -445,15 +477,16 @@ mod tests {
         };
         let vertices =
             VertexMap { width: 151, height: 99, points: (0..151 * 99).map(at).collect() };
-        for region in [
-            Region::whole(151, 99),
-            Region { columns: 1..150, rows: 3..98 },
-            Region { columns: 47..78, rows: 40..41 },
-            Region { columns: 150..151, rows: 0..99 },
+        for (reach, region) in [
+            (2, Region::whole(151, 99)),
+            (2, Region { columns: 1..150, rows: 3..98 }),
+            (3, Region { columns: 47..78, rows: 40..41 }),
+            (5, Region { columns: 150..151, rows: 0..99 }),
+            (5, Region::whole(151, 99)),
         ] {
-            let expected = plainly(&vertices, &region);
+            let expected = plainly(&vertices, &region, reach);
             let nothing = vec![Vec3::NAN; vertices.points.len()];
-            let found = NormalMap::within(nothing, &vertices, &region).normals;
+            let found = NormalMap::within(nothing, &vertices, &region, reach).normals;
             for (pixel, (found, expected)) in found.iter().zip(&expected).enumerate() {
                 let same =
                     found.is_nan() && expected.is_nan() || (found - expected).length() < 1e-6;

@@ -163,6 +163,31 @@ fn the_nearest_of_two_is_followed_even_when_the_other_comes_nearer() {
 }
 
 #[test]
+fn whoever_is_picked_is_followed_though_another_is_nearer() {
+    let view = |near_m: f32, far_m: f32| {
+        render(
+            &[
+                room(),
+                figure(at(-0.6, near_m), 4),
+                figure(at(0.7, far_m), 4),
+            ],
+            0.0,
+        )
+    };
+    let mut cleaner = Cleaner::new(calibration(AZURE), CleanConfig::default());
+    cleaner.pick([0.7, 0.4]);
+    for number in 0..4 {
+        let view = view(2.0, 2.6 + 0.05 * number as f32);
+        let clean = cleaner.process(&expose(&view, AZURE, number)).unwrap();
+        let (wrong, missing) = mask_errors(&clean, &view, 2);
+        assert!(
+            wrong < 0.01 && missing < 0.06,
+            "{wrong} wrong, {missing} missing"
+        );
+    }
+}
+
+#[test]
 fn a_hand_held_out_in_front_of_the_chest_is_the_persons() {
     // The forearm points at the camera and is hidden behind its own hand.
     let hand = {

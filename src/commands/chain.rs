@@ -103,6 +103,7 @@ pub(crate) fn report_of(
     let body = body_model(args.body.as_deref())?;
     let mut settings = Settings::load(args.config.as_deref())?;
     settings.keyframes.count = args.keyframes.unwrap_or(settings.keyframes.count);
+    settings.clean.segment.pick = args.pick.or(settings.clean.segment.pick);
     let smooth = *settings
         .smooth
         .get_or_insert(match (input.pace, input.smoothed) {

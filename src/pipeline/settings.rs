@@ -138,6 +138,12 @@ impl Settings {
             threads <= MOST_THREADS,
             "fine_tune.threads.count is {threads}, expected at most {MOST_THREADS}, or 0 for as many as there are cores"
         );
+        if let Some(place) = self.clean.segment.pick {
+            ensure!(
+                place.iter().all(|share| (0.0..=1.0).contains(share)),
+                "clean.segment.pick is {place:?}, expected a place in the picture, from [0, 0] at its top left to [1, 1]"
+            );
+        }
         if let Some([nearest, farthest]) = self.clean.range_m {
             ensure!(
                 nearest >= 0.0 && nearest < farthest,

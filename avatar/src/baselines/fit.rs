@@ -1,6 +1,6 @@
 //! Learning a conditioned field: the samples, draws, losses and schedule of fine-tuning, on other networks.
 
-use std::ops::ControlFlow;
+use std::{ops::ControlFlow, sync::Arc};
 
 use glam::Vec3;
 use rand::{SeedableRng as _, rngs::StdRng};
@@ -21,12 +21,12 @@ use crate::{
     sdf::loss::{LossPoint, point_loss},
 };
 
-/// Learns from some frames; `config.rates.field` is Adam's rate. `labels` say where the minimal body is, which only
-/// occupancy needs. Ends early, with what is learned so far, when `go_on` breaks.
+/// Learns from some frames; `config.rates.field` is Adam's rate. `labels` say where the minimal body of each sample is,
+/// which only occupancy needs; others give none. Ends early, with what is learned so far, when `go_on` breaks.
 pub fn fit(
     field: &mut ConditionedField,
     samples: &[CanonicalSamples],
-    labels: Option<&BodyLabels>,
+    labels: &[Arc<BodyLabels>],
     config: &FineTuneConfig,
     go_on: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> Result<(), AvatarError> {
@@ -83,7 +83,7 @@ struct Drawn {
 
 fn draw(
     keyframes: &[KeyframePoints],
-    labels: Option<&BodyLabels>,
+    labels: &[Arc<BodyLabels>],
     config: &FineTuneConfig,
     rng: &mut StdRng,
 ) -> Vec<Drawn> {
@@ -92,7 +92,7 @@ fn draw(
     for keyframe in numbers {
         let (mut points, mut known) = (Vec::new(), Vec::new());
         keyframes[keyframe].draw(&config.sampling, rng, &mut points, &mut known);
-        if let Some(labels) = labels {
+        if let Some(labels) = labels.get(keyframe) {
             labels.fill(&mut points, &mut known, rng);
         }
         drawn.push(Drawn { keyframe, points, known });
@@ -148,7 +148,7 @@ mod tests {
         let mut field = ConditionedField::new(Architecture::Siren, 1);
         let samples = [0.0, 1.0].map(keyframe);
         let mut go_on = || ControlFlow::Continue(());
-        fit(&mut field, &samples, None, &config, &mut go_on).unwrap();
+        fit(&mut field, &samples, &[], &config, &mut go_on).unwrap();
         for bend_rad in [0.0, 1.0] {
             let radius = 0.5 + 0.1 * bend_rad;
             let mut values = [0.0; 2];

@@ -18,7 +18,7 @@ const SOFTNESS: f32 = 0.005;
 /// Deeper in the minimal body than this a point is inside whatever is worn...
 const SURELY_INSIDE_M: f32 = 0.01;
 /// ...and farther from it than this, outside.
-const SURELY_OUTSIDE_M: f32 = 0.15;
+const SURELY_OUTSIDE_M: f32 = 0.08;
 
 const LABELLED_POINTS: usize = 20_000;
 

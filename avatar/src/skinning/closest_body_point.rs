@@ -184,7 +184,7 @@ fn smoothstep([from, to]: [f32; 2], x: f32) -> f32 {
 }
 
 /// The minimal body in star pose, without pose correctives.
-pub(crate) fn star_body(model: &BodyModel, betas: &[f32; 10]) -> Vec<Vec3> {
+pub fn star_body(model: &BodyModel, betas: &[f32; 10]) -> Vec<Vec3> {
     let mut vertices = model.shaped_vertices(betas);
     let star = star_transforms(&model.joints(&vertices));
     for (vertex, weights) in vertices.iter_mut().zip(&model.skinning) {

@@ -18,7 +18,7 @@ use rayon::prelude::*;
 
 use crate::neighbors::Neighbors;
 
-pub(crate) use closest_body_point::star_body;
+pub use closest_body_point::star_body;
 pub use closest_body_point::{ClosestBodyPoint, ClosestBodyPointConfig};
 pub use network::{NetworkSkinning, SkinningNetworks};
 pub use warp::Warp;

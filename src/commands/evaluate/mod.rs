@@ -9,7 +9,7 @@ use effigy_registration::smpl::builtin;
 use serde::Serialize;
 
 pub(crate) use self::avatar::{HEADLINE_SEEDS, Method, Table};
-use self::tracking::{Suite, Variant};
+use self::tracking::{Case, Suite, Variant};
 use crate::{
     cli::{EvaluateArgs, EvaluateTrackingArgs, EvaluateWhat, Protocol},
     files, interrupt,
@@ -51,14 +51,23 @@ fn evaluate_tracking(args: &EvaluateTrackingArgs) -> anyhow::Result<()> {
     } else {
         &[Variant::Default]
     };
-    let count = cases.len() * variants.len();
+    let of_variant = |variant: Variant| -> Vec<Case> {
+        let cases = cases.iter().filter(|case| variant.applies_to(case));
+        cases.cloned().collect()
+    };
+    let suites: Vec<_> = variants
+        .iter()
+        .map(|&variant| (variant, of_variant(variant)))
+        .collect();
+    let count: usize = suites.iter().map(|(_, cases)| cases.len()).sum();
     let progress = Progress::new("tracking", Some(count as u64));
-    let options = tracking::Options { clean: settings.clean, track: settings.track };
+    let options =
+        tracking::Options { clean: settings.clean, track: settings.track, true_surface: false };
     let mut table = tracking::Table::default();
-    for (number, variant) in variants.iter().enumerate() {
-        let before = number * cases.len();
+    let mut before = 0;
+    for (variant, cases) in &suites {
         table.append(tracking::evaluate(
-            &cases,
+            cases,
             &builtin::body(),
             (*variant, &options),
             &|done| {
@@ -66,8 +75,13 @@ fn evaluate_tracking(args: &EvaluateTrackingArgs) -> anyhow::Result<()> {
                 !interrupt::requested()
             },
         )?);
+        before += cases.len();
     }
     progress.finish();
+    // Whoever tunes on other people has no business with these.
+    if args.people.is_empty() && !interrupt::requested() {
+        table.append(tracking::explain_real_people(&builtin::body(), &options)?);
+    }
     say!("{}", table.to_string().trim_end());
     let report =
         Report { schema: SCHEMA, machine: Machine::this(), quick: args.quick, table: &table };

@@ -37,6 +37,9 @@ pub struct SegmentConfig {
     pub floor: FloorConfig,
     pub body: BodyConfig,
     pub visibility: VisibilityConfig,
+    /// Who is followed at first, if not the nearest: whoever is nearest to this place in the picture, from `[0, 0]` at
+    /// its top left to `[1, 1]`.
+    pub pick: Option<[f32; 2]>,
 }
 
 /// What was found in one frame.
@@ -62,6 +65,8 @@ pub struct Segmenter {
     valid_window: ValidWindow,
     /// Where the person was seen last, and how many frames ago.
     target: Option<(Vec3, u32)>,
+    /// Who is to be followed from the next frame on that shows anybody.
+    pick: Option<[f32; 2]>,
 }
 
 impl Segmenter {
@@ -72,8 +77,14 @@ impl Segmenter {
             labels: Labels::default(),
             valid_window: ValidWindow::default(),
             target: None,
+            pick: config.pick,
             config,
         }
+    }
+
+    /// From the next frame on follows whoever is nearest to a place in the picture: see [`SegmentConfig::pick`].
+    pub fn pick(&mut self, place: [f32; 2]) {
+        self.pick = Some(place);
     }
 
     /// Finds the person in the next frame.
@@ -94,7 +105,7 @@ impl Segmenter {
             tolerance,
             &self.config.body,
         );
-        self.choose(&mut bodies);
+        self.choose(&mut bodies, rays);
         let Some(chosen) = bodies.first() else {
             return Segmentation {
                 person: vec![false; depth.metres.len()],
@@ -111,9 +122,18 @@ impl Segmenter {
         Segmentation { person, region, floor, visibility, bodies }
     }
 
-    /// Puts the body that was followed first, or else the nearest.
-    fn choose(&mut self, bodies: &mut [Body]) {
+    /// Puts the body first that was picked or followed, or else the nearest.
+    fn choose(&mut self, bodies: &mut [Body], rays: &Rays) {
         let config = &self.config.body;
+        if !bodies.is_empty()
+            && let Some(place) = self.pick.take()
+        {
+            let ray = rays.at(place);
+            let off = |body: &Body| (body.centroid / body.centroid.z).truncate().distance(ray);
+            bodies.sort_by(|a, b| off(a).total_cmp(&off(b)));
+            self.target = Some((bodies[0].centroid, 0));
+            return;
+        }
         if let Some((last, missed)) = self.target {
             let nearest = |body: &Body| body.centroid.distance(last);
             bodies.sort_by(|a, b| nearest(a).total_cmp(&nearest(b)));

@@ -2,7 +2,7 @@
 
 use std::{ops::ControlFlow, sync::Arc};
 
-use anyhow::Context as _;
+use anyhow::{Context as _, bail};
 use effigy_avatar::{
     Avatar, AvatarError, CanonicalSamples, CanonicaliseConfig, Canonicaliser, PoseField, PoseInput,
     SignedDistanceField, TopologyConfig,
@@ -14,6 +14,7 @@ use effigy_avatar::{
 };
 use effigy_fusion::{TriangleMesh, mesh::sample::sample_surface};
 use effigy_registration::{BodyModel, BodyParams};
+use glam::{Quat, Vec3};
 
 use super::{
     fitted::track,
@@ -50,6 +51,8 @@ const ABLATION_RATE: f32 = 2e-4;
 pub(super) struct Fitted {
     body: Arc<BodyModel>,
     betas: [f32; 10],
+    /// Where the poses it learned from had the pelvis, in its own axes: whoever drives it has it there as well.
+    pelvis_off_m: Vec3,
     surface: Surface,
 }
 
@@ -61,10 +64,12 @@ enum Surface {
 }
 
 impl Fitted {
-    /// The surface in a true pose: the pelvis of the shape that is known lies on that of the true one.
+    /// The surface in a true pose: the pelvis of the shape that is known lies on that of the true one, or where it was
+    /// on average while it learned.
     pub(super) fn posed(&self, params: &BodyParams) -> TriangleMesh {
         let pelvis = |betas| self.body.joints(&self.body.shaped_vertices(betas))[0];
-        let trans = params.trans + pelvis(&params.betas) - pelvis(&self.betas);
+        let off = Quat::from_scaled_axis(params.theta[0]) * self.pelvis_off_m;
+        let trans = params.trans + pelvis(&params.betas) - pelvis(&self.betas) + off;
         let params = BodyParams { betas: self.betas, trans, ..*params };
         match &self.surface {
             Surface::Body => {
@@ -123,8 +128,9 @@ pub(super) fn fit(job: &Job, given: &Given<'_>) -> anyhow::Result<Outcome> {
     let learned_from = seen.samples.len();
     let betas = seen.canonicaliser.subject().betas;
     let body = Arc::clone(given.body);
+    let pelvis_off_m = seen.pelvis_off_m;
     if job.method == Method::BareBody {
-        let fitted = Fitted { body, betas, surface: Surface::Body };
+        let fitted = Fitted { body, betas, pelvis_off_m, surface: Surface::Body };
         return Ok(Outcome { fitted, asked, learned_from, seconds: 0.0 });
     }
     let start = given.clock.secs();
@@ -134,7 +140,7 @@ pub(super) fn fit(job: &Job, given: &Given<'_>) -> anyhow::Result<Outcome> {
         Some(avatar) => Surface::Avatar(Box::new((avatar, seen.canonicaliser))),
         None => Surface::Nothing,
     };
-    let fitted = Fitted { body, betas, surface };
+    let fitted = Fitted { body, betas, pelvis_off_m, surface };
     Ok(Outcome { fitted, asked, learned_from, seconds })
 }
 
@@ -143,6 +149,7 @@ struct Seen {
     canonicaliser: Canonicaliser,
     samples: Vec<CanonicalSamples>,
     asked: usize,
+    pelvis_off_m: Vec3,
 }
 
 /// Looks at the frames a job learns from, and says how long canonicalising them took.
@@ -158,6 +165,9 @@ fn see(job: &Job, given: &Given<'_>) -> anyhow::Result<(Seen, f64)> {
     let betas = tracked
         .as_ref()
         .map_or(first.sequence.betas, |tracked| tracked.betas);
+    let pelvis_off_m = tracked
+        .as_ref()
+        .map_or(Vec3::ZERO, |tracked| tracked.pelvis_off_m);
     let config = CanonicaliseConfig { seed: job.seed, ..settings.canonicalise.clone() };
     let canonicaliser =
         Canonicaliser::new(Arc::clone(body), &betas, config)?.with_camera(views.camera());
@@ -191,7 +201,10 @@ fn see(job: &Job, given: &Given<'_>) -> anyhow::Result<(Seen, f64)> {
         }
     }
     let asked = lessons.len();
-    Ok((Seen { canonicaliser, samples, asked }, seconds))
+    Ok((
+        Seen { canonicaliser, samples, asked, pelvis_off_m },
+        seconds,
+    ))
 }
 
 /// The avatar, if what was learned has a surface.
@@ -246,7 +259,7 @@ fn field(job: &Job, seen: &Seen, given: &Given<'_>) -> anyhow::Result<Arc<dyn Po
                 Pretrained::Conditioned(mut field) => {
                     let rates = RateConfig { field: ABLATION_RATE, ..tuning.rates };
                     let tuning = FineTuneConfig { rates, ..tuning };
-                    baselines::fit(&mut field, samples, None, &tuning, &mut go_on)?;
+                    baselines::fit(&mut field, samples, &[], &tuning, &mut go_on)?;
                     Arc::new(field)
                 }
             }
@@ -269,16 +282,22 @@ fn baseline(
         rates: RateConfig { field: BASELINE_RATE, ..tuning.rates },
         ..*tuning
     };
-    let (mut field, labels) = if job.method == Method::Occupancy {
-        let labels = BodyLabels::new(given.body, person, job.seed)?;
-        let field = ConditionedField::new(Architecture::Occupancy, job.seed);
-        (field, Some(labels))
-    } else {
-        let map = PoseMap::new(person, &**canonicaliser.skinning());
-        let field = ConditionedField::new(Architecture::Scanimate, job.seed);
-        (field.with_pose_map(Arc::new(map)), None)
-    };
-    baselines::fit(&mut field, samples, labels.as_ref(), &tuning, &mut go_on)?;
+    if job.method == Method::Occupancy {
+        // As LEAP it knows people: from eight frames alone occupancy learns nothing that holds in a ninth.
+        let Some(Pretrained::Conditioned(mut field)) = given.pretrained.clone() else {
+            bail!("occupancy was not taught");
+        };
+        let labels = Arc::new(BodyLabels::new(given.body, person, job.seed)?);
+        let labels = vec![labels; samples.len()];
+        let rates = RateConfig { field: ABLATION_RATE, ..tuning.rates };
+        let tuning = FineTuneConfig { rates, ..tuning };
+        baselines::fit(&mut field, samples, &labels, &tuning, &mut go_on)?;
+        return Ok(field);
+    }
+    let map = PoseMap::new(person, &**canonicaliser.skinning());
+    let field = ConditionedField::new(Architecture::Scanimate, job.seed);
+    let mut field = field.with_pose_map(Arc::new(map));
+    baselines::fit(&mut field, samples, &[], &tuning, &mut go_on)?;
     Ok(field)
 }
 

@@ -155,7 +155,7 @@ impl Evaluation<'_> {
     /// Makes an avatar and judges it: a row for each task that has frames.
     fn row(&mut self, job: &Job, subject: &Subject) -> anyhow::Result<Vec<Row>> {
         let body = builtin::body();
-        let pretrained = if job.table == Table::Ablation {
+        let pretrained = if job.table == Table::Ablation || job.method == Method::Occupancy {
             let how = (&self.settings, self.clock);
             Some(self.school.taught(job.method, &self.dataset, &body, how)?)
         } else {

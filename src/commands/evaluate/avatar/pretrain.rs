@@ -1,11 +1,11 @@
-//! The ablation's networks learn of people in general: the data set's training people, all frames alike, every network
-//! with the same draws, losses and schedule.
+//! The ablation's networks, and occupancy, learn of people in general: the data set's training people, all frames
+//! alike, every network with the same draws and schedule.
 
 use std::sync::Arc;
 
 use effigy_avatar::{
     CanonicalSamples, Canonicaliser,
-    baselines::{Architecture, ConditionedField, fit},
+    baselines::{Architecture, BodyLabels, ConditionedField, fit},
     canonicalise::CanonicaliseConfig,
     fine_tune::{FineTuneConfig, fine_tune},
     hyper::{HyperNetwork, RateConfig},
@@ -40,6 +40,8 @@ pub(super) enum Pretrained {
 #[derive(Default)]
 pub(super) struct School {
     samples: Vec<CanonicalSamples>,
+    /// Where the body of each sample's person is.
+    labels: Vec<Arc<BodyLabels>>,
     taught: Vec<(Method, Pretrained)>,
 }
 
@@ -55,10 +57,11 @@ impl School {
             return Ok(network.clone());
         }
         if self.samples.is_empty() {
-            self.samples = training_people(dataset, body, &settings.canonicalise)?;
+            (self.samples, self.labels) = training_people(dataset, body, &settings.canonicalise)?;
         }
         let prior = settings.prior_network(body.identity)?;
-        let network = teach(method, &self.samples, (&prior, &settings.fine_tune), clock)?;
+        let lessons = (&self.samples[..], &self.labels[..]);
+        let network = teach(method, lessons, (&prior, &settings.fine_tune), clock)?;
         self.taught.push((method, network.clone()));
         Ok(network)
     }
@@ -66,7 +69,7 @@ impl School {
 
 fn teach(
     method: Method,
-    samples: &[CanonicalSamples],
+    (samples, labels): (&[CanonicalSamples], &[Arc<BodyLabels>]),
     (prior, live): (&HyperNetwork, &FineTuneConfig),
     clock: Clock,
 ) -> anyhow::Result<Pretrained> {
@@ -84,7 +87,12 @@ fn teach(
             ..config
         };
         let mut field = ConditionedField::new(architecture, live.seed);
-        fit(&mut field, samples, None, &config, &mut go_on)?;
+        let labels = if method == Method::Occupancy {
+            labels
+        } else {
+            &[]
+        };
+        fit(&mut field, samples, labels, &config, &mut go_on)?;
         return Ok(Pretrained::Conditioned(field));
     }
     let mut network = prior.with_fresh_heads(live.seed);
@@ -102,6 +110,7 @@ fn architecture(method: Method) -> Option<Architecture> {
         Method::Mlp => Some(Architecture::Mlp),
         Method::PositionalEncoding => Some(Architecture::PositionalEncoding),
         Method::Siren => Some(Architecture::Siren),
+        Method::Occupancy => Some(Architecture::Occupancy),
         _ => None,
     }
 }
@@ -111,17 +120,19 @@ fn training_people(
     dataset: &Dataset,
     body: &Arc<BodyModel>,
     config: &CanonicaliseConfig,
-) -> anyhow::Result<Vec<CanonicalSamples>> {
-    let mut samples = Vec::new();
+) -> anyhow::Result<(Vec<CanonicalSamples>, Vec<Arc<BodyLabels>>)> {
+    let (mut samples, mut labels) = (Vec::new(), Vec::new());
     let entries = dataset.manifest().sequences.iter();
     for entry in entries.filter(|entry| entry.plan.split == Split::Train) {
         let sequence = dataset.load(entry)?;
         let person = Canonicaliser::new(Arc::clone(body), &sequence.betas, config.clone())?;
+        let where_body_is = Arc::new(BodyLabels::new(body, person.subject(), 0)?);
         for frame in evenly_placed(sequence.frames.len(), FRAMES) {
             let seed = samples.len() as u64;
             let points = sample_surface(&sequence.posed_mesh(frame), POINTS, seed);
             samples.push(person.process_surface(&sequence.params(frame), &points).0);
+            labels.push(Arc::clone(&where_body_is));
         }
     }
-    Ok(samples)
+    Ok((samples, labels))
 }

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use effigy_avatar::skinning::star_body;
 use effigy_capture::{Frame, FrameId, Intrinsics, Timestamp};
 use effigy_fusion::clean::Cleaner;
 use effigy_registration::{
@@ -55,6 +56,9 @@ pub(super) fn follow(
             FrameScore::of_nobody(&registered, milliseconds)
         };
         scores.frames.push(score);
+        if options.true_surface && registered.params().is_some() {
+            reality.tell_surface(FrameId(moment.content), &mut chain.tracker, body)?;
+        }
         chain.recycle(registered);
     }
     scores.losses = losses_of(&moments, &scores.frames);
@@ -97,6 +101,22 @@ impl<'a> Reality<'a> {
             }
             Self::Stranger(judge) => judge.score(registered, content, ms),
         }
+    }
+
+    /// Tells a tracker how far each of its body's vertices is from the surface that a frame truly has.
+    fn tell_surface(
+        &self,
+        content: FrameId,
+        tracker: &mut Tracker,
+        body: &BodyModel,
+    ) -> anyhow::Result<()> {
+        if let Self::Person { truth, .. } = self {
+            let surface = truth.at(content).clothed_canonical;
+            let skin = star_body(body, &tracker.betas());
+            let offsets: Vec<_> = surface.iter().zip(&skin).map(|(a, b)| *a - *b).collect();
+            tracker.set_surface(&offsets)?;
+        }
+        Ok(())
     }
 
     /// What can only be known after the last frame.

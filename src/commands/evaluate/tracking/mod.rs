@@ -3,6 +3,7 @@
 mod cpu_time;
 mod follow;
 mod loss;
+mod real;
 mod score;
 mod statistics;
 mod strangers;
@@ -33,6 +34,16 @@ use score::CaseScores;
 pub(crate) struct Options {
     pub(crate) clean: CleanConfig,
     pub(crate) track: TrackConfig,
+    /// Whether the tracker is told the surface that the last frame truly had.
+    pub(crate) true_surface: bool,
+}
+
+/// How well people of real recordings are explained, who stand beside those of the suites.
+pub(crate) fn explain_real_people(
+    body: &Arc<BodyModel>,
+    options: &Options,
+) -> anyhow::Result<Table> {
+    Ok(Table::of_real_people(real::rows(body, options)?))
 }
 
 /// Follows everybody of a suite, each case on one core; `go_on` hears how many cases are done and may stop it.

@@ -5,6 +5,7 @@ use std::fmt;
 use serde::Serialize;
 
 use super::{
+    real::RealRow,
     score::{BodyErrors, CaseScores, FrameScore, State},
     statistics::{mean, percentile, root_mean_square, share},
     suite::{Case, Purpose},
@@ -23,6 +24,7 @@ const NEVER_SECS: f32 = 99.0;
 pub(crate) struct Table {
     rows: Vec<Row>,
     runs: Vec<Run>,
+    real: Vec<RealRow>,
 }
 
 /// One sensor and outfit; figures that nothing was measured for are `null`.
@@ -99,12 +101,21 @@ impl Table {
             person: case.scenario.seed,
             figures: Row::new((variant, &Key::of(case)), &[(*case, scores)]),
         };
-        Self { rows: keys.iter().map(of_key).collect(), runs: scored.iter().map(run).collect() }
+        Self {
+            rows: keys.iter().map(of_key).collect(),
+            runs: scored.iter().map(run).collect(),
+            real: Vec::new(),
+        }
+    }
+
+    pub(super) fn of_real_people(real: Vec<RealRow>) -> Self {
+        Self { real, ..Self::default() }
     }
 
     pub(crate) fn append(&mut self, other: Self) {
         self.rows.extend(other.rows);
         self.runs.extend(other.runs);
+        self.real.extend(other.real);
     }
 }
 
@@ -290,6 +301,9 @@ impl fmt::Display for Table {
         writeln!(f)?;
         for Run { motion, person, figures } in &self.runs {
             figures.write_line(f, &format!("{} {motion} {person}", figures.name()))?;
+        }
+        for row in &self.real {
+            writeln!(f, "{}", row.line())?;
         }
         Ok(())
     }

@@ -2,7 +2,7 @@
 
 use effigy_registration::EnergyConfig;
 
-use super::Options;
+use super::{Case, Options};
 
 /// Settings beside those asked for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -18,15 +18,19 @@ pub(crate) enum Variant {
     /// shape prior, and nothing else. Its forest of part labels it lacks, and it has our point-to-plane distance, our
     /// way of finding people and our weights of the priors.
     Sxyu,
+    /// Told each frame's true surface instead of the body's: as much as an avatar could tell. Only of people in clothes
+    /// that are part of their surface.
+    TrueSurface,
 }
 
 impl Variant {
-    pub(crate) const ALL: [Self; 5] = [
+    pub(crate) const ALL: [Self; 6] = [
         Self::Default,
         Self::NoClothTerm,
         Self::NoVisibility,
         Self::NoTemporalTerm,
         Self::Sxyu,
+        Self::TrueSurface,
     ];
 
     pub(crate) fn name(self) -> &'static str {
@@ -36,6 +40,19 @@ impl Variant {
             Self::NoVisibility => "no_visibility",
             Self::NoTemporalTerm => "no_temporal_term",
             Self::Sxyu => "sxyu",
+            Self::TrueSurface => "true_surface",
+        }
+    }
+
+    /// Strangers are for the tracker as it is; a surface is known of clothes that are part of it.
+    pub(crate) fn applies_to(self, case: &Case) -> bool {
+        let scenario = &case.scenario;
+        match self {
+            Self::Default => true,
+            Self::NoClothTerm | Self::NoVisibility | Self::NoTemporalTerm | Self::Sxyu => {
+                scenario.stranger.is_none()
+            }
+            Self::TrueSurface => scenario.stranger.is_none() && scenario.outfit.cloth().is_none(),
         }
     }
 
@@ -46,6 +63,7 @@ impl Variant {
         match self {
             Self::Default => {}
             Self::NoClothTerm => track.energy = without_cloth(track.energy),
+            Self::TrueSurface => options.true_surface = true,
             Self::NoVisibility => track.energy.visible_only = false,
             Self::NoTemporalTerm => track.energy.temporal_weight = 0.0,
             Self::Sxyu => {
