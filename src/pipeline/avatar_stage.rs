@@ -2,7 +2,11 @@
 
 use std::{collections::BTreeSet, sync::Arc};
 
-use effigy_avatar::{Avatar, AvatarMesh, Driver, KeyframeSelector, fine_tune::FineTuneProgress};
+use crossbeam::channel::Sender;
+use effigy_avatar::{
+    Avatar, AvatarMesh, Driver, KeyframeSelector, fine_tune::FineTuneProgress,
+    skinning::offsets_from_body,
+};
 use effigy_capture::{CameraModel, FrameId};
 use effigy_registration::{BodyModel, RegisteredFrame, SmoothConfig, Smoother};
 
@@ -11,6 +15,7 @@ use super::{
     clock::{Clock, Timings},
     schedule::{Decision, Schedule},
     settings::Settings,
+    track_stage::{Followed, Handover},
 };
 
 pub(crate) struct AvatarStage {
@@ -105,6 +110,28 @@ impl AvatarStage {
             decided.push(decision);
         }
         Ok(decided)
+    }
+
+    /// Has tracking follow a new avatar's surface, or the bare body again, as far as the settings want that. `number` is
+    /// that of the frame that was decided at.
+    pub(crate) fn hand_surface_over(
+        &self,
+        decided: &[Decision],
+        number: u64,
+        hand_over: &Sender<Handover>,
+    ) {
+        /// More frames than lie between tracking and driving: a replay must begin at the same one.
+        const AHEAD: u64 = 8;
+        let surface = match (decided.last(), &self.made) {
+            _ if !self.settings.schedule.follow_avatar => return,
+            (Some(Decision::TakeOver), Some(made)) if !made.is_preview => {
+                Followed::Avatar(offsets_from_body(made.driver.avatar(), &self.body))
+            }
+            (Some(Decision::StartOver), _) => Followed::BareBody,
+            _ => return,
+        };
+        // Tracking that has ended follows nothing.
+        drop(hand_over.send(Handover { from: number + AHEAD, surface }));
     }
 
     /// Whether the chain loses frames as it is, without any fine-tuning.

@@ -23,7 +23,7 @@ pub(crate) fn run(
     (avatar, outputs): (&mut AvatarStage, &mut Outputs),
     clock: Clock,
 ) -> anyhow::Result<RunLog> {
-    let (mut cleaning, mut tracking) =
+    let (mut cleaning, mut tracking, hand_over) =
         stages(source.calibration(), Arc::clone(body), settings, clock);
     let mut log = RunLog::new(clock);
     let mut captured = Captured::default();
@@ -37,6 +37,7 @@ pub(crate) fn run(
         let registered = &tracked.registered;
         log.registered(&tracked);
         let decided = avatar.advance(registered)?;
+        avatar.hand_surface_over(&decided, tracked.number, &hand_over);
         let mesh = avatar.drive(registered);
         outputs.record(&frame, &decided)?;
         outputs.frame(&frame, registered, mesh.as_ref(), (avatar, &log))?;

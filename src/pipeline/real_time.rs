@@ -27,7 +27,7 @@ use super::{
     outputs::Outputs,
     run_log::{Captured, RunLog},
     settings::Settings,
-    track_stage::{CleanStage, CleanedFrame, TrackStage, TrackedFrame, stages},
+    track_stage::{CleanStage, CleanedFrame, Handover, TrackStage, TrackedFrame, stages},
 };
 use crate::interrupt;
 
@@ -64,7 +64,8 @@ pub(crate) fn run(
     (avatar, outputs): (&mut AvatarStage, &mut Outputs),
     (clock, controls): (Clock, &Controls),
 ) -> anyhow::Result<RunLog> {
-    let (cleaning, tracking) = stages(source.calibration(), Arc::clone(body), settings, clock);
+    let (cleaning, tracking, hand_over) =
+        stages(source.calibration(), Arc::clone(body), settings, clock);
     let (to_clean, frames) = bounded(QUEUE);
     // Handed over directly: a cleaned frame that waited would only be late.
     let (to_track, cleaned) = bounded(0);
@@ -99,7 +100,12 @@ pub(crate) fn run(
                 track(tracking, &cleaned, &to_drive);
             })
             .context("cannot start the tracking thread")?;
-        let driven = drive(&tracked, avatar, outputs, (&mut log, controls));
+        let driven = drive(
+            (&tracked, &hand_over),
+            avatar,
+            outputs,
+            (&mut log, controls),
+        );
         // Closes the queue, so that the threads before it end too.
         drop(tracked);
         track.join().unwrap_or_else(|panic| resume_unwind(panic));
@@ -234,7 +240,7 @@ impl Load {
 }
 
 fn drive(
-    tracked: &Receiver<Tracked>,
+    (tracked, hand_over): (&Receiver<Tracked>, &Sender<Handover>),
     avatar: &mut AvatarStage,
     outputs: &mut Outputs,
     (log, controls): (&mut RunLog, &Controls),
@@ -258,6 +264,7 @@ fn drive(
         log.playback = delivered.playback;
         avatar.note_load(load.is_too_high(delivered.dropped_so_far));
         let decided = avatar.advance(registered)?;
+        avatar.hand_surface_over(&decided, tracked.number, hand_over);
         let mesh = avatar.drive(registered);
         let latency = log.clock.now().saturating_sub(delivered.at);
         log.latency(latency, (was_making, mesh.is_some()));

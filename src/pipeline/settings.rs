@@ -73,6 +73,8 @@ pub(crate) struct ScheduleConfig {
     pub(crate) improve_new_keyframes: usize,
     /// ...and it has been driven for this long.
     pub(crate) improve_after_frames: u64,
+    /// Whether tracking aligns to the avatar's surface instead of the bare body's once there is one.
+    pub(crate) follow_avatar: bool,
 }
 
 impl Default for ScheduleConfig {
@@ -83,6 +85,7 @@ impl Default for ScheduleConfig {
             preview_after_frames: 15,
             improve_new_keyframes: 3,
             improve_after_frames: 150,
+            follow_avatar: false,
         }
     }
 }

@@ -3,10 +3,11 @@
 use std::{collections::VecDeque, sync::Arc, time::Duration};
 
 use anyhow::Context as _;
-use crossbeam::channel::{Receiver, Sender, TryRecvError, bounded};
+use crossbeam::channel::{Receiver, Sender, TryRecvError, bounded, unbounded};
 use effigy_capture::{Calibration, Frame};
 use effigy_fusion::{CleanFrame, clean::Cleaner};
 use effigy_registration::{BodyModel, RegisteredFrame, track::Tracker};
+use glam::Vec3;
 
 use super::{clock::Clock, settings::Settings};
 
@@ -26,6 +27,24 @@ pub(crate) struct TrackStage {
     /// The latest frames: once nobody else holds one, its memory goes back.
     recent: VecDeque<Arc<RegisteredFrame>>,
     give_back: Sender<CleanFrame>,
+    /// Frames tracked so far.
+    count: u64,
+    handovers: Receiver<Handover>,
+    next_handover: Option<Handover>,
+}
+
+/// A surface to follow from a frame on.
+pub(crate) struct Handover {
+    /// Counted as they are tracked, from 1.
+    pub(crate) from: u64,
+    pub(crate) surface: Followed,
+}
+
+/// What is followed.
+pub(crate) enum Followed {
+    /// For each of the body's vertices how far the surface is from it, in canonical space.
+    Avatar(Vec<Vec3>),
+    BareBody,
 }
 
 /// A cleaned frame and what it took.
@@ -37,25 +56,37 @@ pub(crate) struct CleanedFrame {
 /// A tracked frame and what it took.
 pub(crate) struct TrackedFrame {
     pub(crate) registered: Arc<RegisteredFrame>,
+    /// The how manieth it is, from 1.
+    pub(crate) number: u64,
     pub(crate) clean_took: Duration,
     pub(crate) track_took: Duration,
 }
 
-/// Both stages of one source.
+/// Both stages of one source, and where surfaces to follow are handed in.
 pub(crate) fn stages(
     calibration: &Calibration,
     body: Arc<BodyModel>,
     settings: &Settings,
     clock: Clock,
-) -> (CleanStage, TrackStage) {
+) -> (CleanStage, TrackStage, Sender<Handover>) {
     let (give_back, used) = bounded(RECENT);
+    let (hand_over, handovers) = unbounded();
     let cleaner = Cleaner::new(calibration.clone(), settings.clean.clone());
     let camera = calibration.depth;
     let world_from_camera = calibration.world_from_camera;
     let tracker = Tracker::new(body, camera, settings.track.clone(), world_from_camera);
     (
         CleanStage { cleaner, clock, used },
-        TrackStage { tracker, clock, recent: VecDeque::new(), give_back },
+        TrackStage {
+            tracker,
+            clock,
+            recent: VecDeque::new(),
+            give_back,
+            count: 0,
+            handovers,
+            next_handover: None,
+        },
+        hand_over,
     )
 }
 
@@ -83,13 +114,35 @@ impl TrackStage {
 
     pub(crate) fn process(&mut self, cleaned: CleanedFrame) -> TrackedFrame {
         self.give_back();
+        self.count += 1;
+        self.take_surface();
         let start = self.clock.now();
         let registered = Arc::new(self.tracker.process(Arc::new(cleaned.clean)));
         self.recent.push_back(Arc::clone(&registered));
         TrackedFrame {
             registered,
+            number: self.count,
             clean_took: cleaned.took,
             track_took: self.clock.now().saturating_sub(start),
+        }
+    }
+
+    /// Follows another surface if it is time to.
+    fn take_surface(&mut self) {
+        self.next_handover = self
+            .handovers
+            .try_iter()
+            .last()
+            .or(self.next_handover.take());
+        let due = |next: &mut Handover| next.from <= self.count;
+        match self.next_handover.take_if(due).map(|next| next.surface) {
+            Some(Followed::Avatar(offsets)) => {
+                if let Err(error) = self.tracker.set_surface(&offsets) {
+                    tracing::warn!(%error, "the avatar's surface is not followed");
+                }
+            }
+            Some(Followed::BareBody) => self.tracker.forget_surface(),
+            None => {}
         }
     }
 

@@ -8,6 +8,7 @@ mod closest_body_point;
 pub mod network;
 mod oriented_bvh;
 mod warp;
+mod worn;
 
 use effigy_registration::{
     PosedBody,
@@ -23,6 +24,7 @@ pub use closest_body_point::{ClosestBodyPoint, ClosestBodyPointConfig};
 pub use network::{NetworkSkinning, SkinningNetworks};
 pub use warp::Warp;
 pub(crate) use warp::{rest_from_canonical, transform_normal};
+pub use worn::offsets_from_body;
 
 /// How much each of the 24 bones moves a point; sums to one.
 pub type BoneWeights = [f32; JOINT_COUNT];
