@@ -90,6 +90,16 @@ fn in_avx2<R>(body: impl FnOnce() -> R) -> R {
     body()
 }
 
+/// The nearest whole number to a value of less than four million in size; of others anything. A vector unit does several
+/// at a time, where a conversion, which asks what is too large or no number, is done one by one.
+#[expect(clippy::inline_always, reason = "compiled anew for each vector unit")]
+#[inline(always)]
+pub(crate) fn nearest_whole(value: f32) -> i32 {
+    // From 2^23 to 2^24 neighbouring floats are 1 apart, so adding rounds.
+    const WHOLE: f32 = 12_582_912.0;
+    (value + WHOLE).to_bits().wrapping_sub(WHOLE.to_bits()) as i32
+}
+
 /// Every unit this machine has, for tests that hold them to each other.
 pub fn units_here() -> Vec<Unit> {
     #[cfg(target_arch = "x86_64")]
@@ -102,6 +112,28 @@ pub fn units_here() -> Vec<Unit> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn whole_numbers_are_the_nearest() {
+        for value in [
+            -4_000_000.3_f32,
+            -17.5,
+            -0.6,
+            -0.4,
+            0.0,
+            0.49,
+            0.51,
+            2.5,
+            640.2,
+            3_999_999.0,
+        ] {
+            assert_eq!(
+                nearest_whole(value),
+                value.round_ties_even() as i32,
+                "{value}"
+            );
+        }
+    }
 
     #[test]
     fn fused_multiply_add_gives_the_same_bits_on_every_unit() {

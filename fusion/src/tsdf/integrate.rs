@@ -14,7 +14,10 @@ use super::{
     block::{BLOCK_SIDE, Block, LAYER, VoxelLayer},
     seen::Seen,
 };
-use crate::{maps::Region, simd};
+use crate::{
+    maps::Region,
+    simd::{self, nearest_whole},
+};
 
 impl TsdfVolume {
     /// Averages a view in. `weight` says how much a pixel counts, by its number: one over its variance,
@@ -180,19 +183,11 @@ impl<'a> Projection<'a> {
         for i in 0..LAYER {
             let inside =
                 (z[i] > 0.0) & (u[i] > -0.5) & (v[i] > -0.5) & (u[i] < right) & (v[i] < bottom);
-            let pixel = nearest(v[i])
+            let pixel = (nearest_whole(v[i]) as u32)
                 .wrapping_mul(columns)
-                .wrapping_add(nearest(u[i]));
+                .wrapping_add(nearest_whole(u[i]) as u32);
             pixels[i] = if inside { pixel } else { self.seen.nothing() };
         }
         pixels
     }
-}
-
-/// The nearest whole number to one that is not negative and below four million; of others anything.
-#[inline(always)]
-fn nearest(value: f32) -> u32 {
-    // Where neighbouring floats are 1 apart, adding rounds; a conversion would have to ask what is too large.
-    const WHOLE: f32 = 12_582_912.0;
-    (value + WHOLE).to_bits().wrapping_sub(WHOLE.to_bits())
 }

@@ -13,7 +13,10 @@ use super::{
     DepthView, TsdfConfig, TsdfVolume,
     block::{BLOCK_SIDE, Block},
 };
-use crate::{maps::Region, simd};
+use crate::{
+    maps::Region,
+    simd::{self, nearest_whole},
+};
 
 /// Pixels at once: a register of AVX-512.
 const LANES: usize = 16;
@@ -151,7 +154,7 @@ impl Reach {
                 for i in 0..LANES {
                     let turned = turn.x * x[i] + turn.y * y[i] + turn.z * z[i];
                     let along = turned * per_length[i];
-                    step[axis][i] = floor(turned + self.origin[axis] + along * offset_m);
+                    step[axis][i] = floor_whole(turned + self.origin[axis] + along * offset_m);
                 }
             }
         }
@@ -163,12 +166,8 @@ pub(super) fn counts(weight: f32) -> bool {
     weight > 0.0
 }
 
-/// Rounded down, of what is less than four million in size; a whole number may become the one below.
+/// Rounded down; a whole number may become the one below.
 #[inline(always)]
-fn floor(value: f32) -> i32 {
-    // Where neighbouring floats are 1 apart, adding rounds; a conversion would have to ask what is too large.
-    const WHOLE: f32 = 12_582_912.0;
-    (value - 0.5 + WHOLE)
-        .to_bits()
-        .wrapping_sub(WHOLE.to_bits()) as i32
+fn floor_whole(value: f32) -> i32 {
+    nearest_whole(value - 0.5)
 }
