@@ -92,7 +92,6 @@ fn in_avx2<R>(body: impl FnOnce() -> R) -> R {
 
 /// The nearest whole number to a value of less than four million in size; of others anything. A vector unit does several
 /// at a time, where a conversion, which asks what is too large or no number, is done one by one.
-#[expect(clippy::inline_always, reason = "compiled anew for each vector unit")]
 #[inline(always)]
 pub(crate) fn nearest_whole(value: f32) -> i32 {
     // From 2^23 to 2^24 neighbouring floats are 1 apart, so adding rounds.

@@ -117,22 +117,19 @@ impl<'a> Projection<'a> {
             z[i] += corner.z;
         }
         let pixels = self.pixels(&[x, y, z]);
-        let mut planes = [[0.0; LAYER]; 4];
+        let mut planes = [[0.0; 4]; LAYER];
         let mut weight = [0.0; LAYER];
         let seen = &self.seen.planes[..];
         let seen_weights = &self.seen.weights[..seen.len()];
         for i in 0..LAYER {
             let pixel = pixels[i] as usize;
-            let plane = seen[pixel].to_array();
-            for axis in 0..4 {
-                planes[axis][i] = plane[axis];
-            }
+            planes[i] = seen[pixel].to_array();
             weight[i] = seen_weights[pixel];
         }
         let mut distance_m = [0.0; LAYER];
         for i in 0..LAYER {
-            distance_m[i] =
-                planes[0][i] * x[i] + planes[1][i] * y[i] + planes[2][i] * z[i] - planes[3][i];
+            let [a, b, c, offset_m] = planes[i];
+            distance_m[i] = a * x[i] + b * y[i] + c * z[i] - offset_m;
         }
         for i in 0..LAYER {
             // Behind the surface by more than the band nothing is known.
