@@ -204,7 +204,7 @@ pub(crate) struct ChainArgs {
     #[arg(long, value_name = "FILE")]
     pub(crate) config: Option<PathBuf>,
     /// Of several people follow the one at this place in the picture, from 0,0 at its top left to 1,1, instead of the
-    /// nearest
+    /// nearest; a replay of a run recorded with this needs it again
     #[arg(long, value_name = "X,Y", value_parser = place_in_picture)]
     pub(crate) pick: Option<[f32; 2]>,
 }

@@ -122,16 +122,20 @@ impl AvatarStage {
     ) {
         /// More frames than lie between tracking and driving: a replay must begin at the same one.
         const AHEAD: u64 = 8;
-        let surface = match (decided.last(), &self.made) {
-            _ if !self.settings.schedule.follow_avatar => return,
-            (Some(Decision::TakeOver), Some(made)) if !made.is_preview => {
-                Followed::Avatar(offsets_from_body(made.driver.avatar(), &self.body))
-            }
-            (Some(Decision::StartOver), _) => Followed::BareBody,
-            _ => return,
+        if !self.settings.schedule.follow_avatar {
+            return;
+        }
+        let surface = |decision: &Decision| match (decision, &self.made) {
+            (Decision::TakeOver, Some(made)) if !made.is_preview => Some(Followed::Avatar(
+                offsets_from_body(made.driver.avatar(), &self.body),
+            )),
+            (Decision::StartOver, _) => Some(Followed::BareBody),
+            _ => None,
         };
-        // Tracking that has ended follows nothing.
-        drop(hand_over.send(Handover { from: number + AHEAD, surface }));
+        if let Some(surface) = decided.iter().rev().find_map(surface) {
+            // Tracking that has ended follows nothing.
+            drop(hand_over.send(Handover { from: number + AHEAD, surface }));
+        }
     }
 
     /// Whether the chain loses frames as it is, without any fine-tuning.

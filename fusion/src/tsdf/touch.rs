@@ -146,7 +146,9 @@ impl Reach {
         let [x, y, z] = &place;
         let mut per_length = [0.0; LANES];
         for i in 0..LANES {
-            per_length[i] = 1.0 / (x[i] * x[i] + y[i] * y[i] + z[i] * z[i]).sqrt();
+            let length = (x[i] * x[i] + y[i] * y[i] + z[i] * z[i]).sqrt();
+            // A point in the camera itself has no ray.
+            per_length[i] = if length > 0.0 { 1.0 / length } else { 0.0 };
         }
         for axis in 0..3 {
             let turn = self.blocks_from_camera.row(axis);

@@ -18,7 +18,7 @@ use std::path::Path;
 
 use anyhow::bail;
 use effigy_registration::smpl::builtin;
-use effigy_sim_sensor::dataset::Dataset;
+use effigy_sim_sensor::dataset::{Dataset, Split};
 
 pub(super) use self::views::{protocol_calibration, protocol_frame};
 use self::{
@@ -117,6 +117,12 @@ impl Evaluation<'_> {
         let methods = &args.methods;
         jobs.retain(|job| methods.is_empty() || methods.contains(&job.method));
         jobs.retain(|job| job.seed <= args.seeds);
+        if jobs.iter().any(Job::learns_people_first) && !self.has_training_people() {
+            say!(
+                "occupancy and the ablation are left out: they learn a data set's training people first, and this one has none"
+            );
+            jobs.retain(|job| !job.learns_people_first());
+        }
         let progress = Progress::new("evaluating", Some((people.len() * jobs.len()) as u64));
         let mut done = 0;
         for entries in people {
@@ -152,10 +158,17 @@ impl Evaluation<'_> {
         Ok(())
     }
 
+    fn has_training_people(&self) -> bool {
+        let sequences = &self.dataset.manifest().sequences;
+        sequences
+            .iter()
+            .any(|entry| entry.plan.split == Split::Train)
+    }
+
     /// Makes an avatar and judges it: a row for each task that has frames.
     fn row(&mut self, job: &Job, subject: &Subject) -> anyhow::Result<Vec<Row>> {
         let body = builtin::body();
-        let pretrained = if job.table == Table::Ablation || job.method == Method::Occupancy {
+        let pretrained = if job.learns_people_first() {
             let how = (&self.settings, self.clock);
             Some(self.school.taught(job.method, &self.dataset, &body, how)?)
         } else {

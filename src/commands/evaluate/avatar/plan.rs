@@ -159,6 +159,13 @@ pub(super) struct Job {
     pub(super) seed: u64,
 }
 
+impl Job {
+    /// Whether its network first learns the data set's training people.
+    pub(super) fn learns_people_first(&self) -> bool {
+        self.table == Table::Ablation || self.method == Method::Occupancy
+    }
+}
+
 /// The avatars of one person in one outfit that the tables ask for.
 pub(super) fn jobs(tables: &[Table], quick: bool) -> Vec<Job> {
     let wanted = tables.iter().flat_map(|&table| of_table(table, quick));

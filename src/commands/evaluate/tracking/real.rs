@@ -12,10 +12,10 @@ use effigy_registration::{BodyModel, RegisteredFrame, Tracker, Tracking};
 use glam::Vec3;
 use serde::Serialize;
 
-use super::Options;
+use super::{Options, suite::DATA};
 
-/// Seen from the repository.
-const RECORDING: &str = "../shared/data/pcl/five_people.pcd";
+/// Among the data sets that strangers come from.
+const RECORDING: &str = "pcl/five_people.pcd";
 /// The one frame is shown this often, so that the shape is learned as it is of somebody who stands still.
 const SHOWN: u64 = 60;
 const RATE_HZ: f64 = 30.0;
@@ -55,11 +55,11 @@ impl RealRow {
 
 /// Everybody in the recording, each followed by themselves; nobody without the recording.
 pub(super) fn rows(body: &Arc<BodyModel>, options: &Options) -> anyhow::Result<Vec<RealRow>> {
-    let path = Path::new(RECORDING);
+    let path = Path::new(DATA).join(RECORDING);
     if !path.exists() {
         return Ok(Vec::new());
     }
-    let mut source = source::open(path)?;
+    let mut source = source::open(&path)?;
     let calibration = source.calibration().clone();
     let frame = source.next_frame()?.context("a cloud is a frame")?;
     let cleaner = Cleaner::new(calibration.clone(), options.clean.clone());

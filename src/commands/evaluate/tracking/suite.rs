@@ -14,7 +14,7 @@ const STRANGER_SECS: f32 = 5.0;
 const LOSS_SECS: f32 = 20.0;
 
 /// Seen from the repository.
-const DATA: &str = "../shared/data";
+pub(super) const DATA: &str = "../shared/data";
 /// Characters that know nothing of SMPL: whose they are, and their files. Nothing was ever tuned on them.
 const STRANGERS: [(&str, &[&str]); 2] = [
     (
