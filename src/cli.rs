@@ -325,7 +325,7 @@ pub(crate) enum DatasetWhat {
 
 #[derive(Debug, Args)]
 pub(crate) struct DatasetMakeArgs {
-    /// What for: prior (to train on), cape-like (the paper's tables), dev (choosing settings), small (tests)
+    /// What for: prior-actions and prior (to train on), cape-like (the paper's tables), dev (choosing settings), small (tests)
     #[arg(long, value_parser = kebab::<DatasetPreset>)]
     pub(crate) preset: DatasetPreset,
     /// Who the people are

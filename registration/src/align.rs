@@ -110,6 +110,18 @@ impl Default for EnergyConfig {
     }
 }
 
+impl EnergyConfig {
+    /// For clothes that stand off by so much on average: as much more or less is to be expected of them.
+    pub(crate) fn with_clothes(&self, thickness_m: f32) -> Self {
+        let ratio = thickness_m / self.cloth_standoff_m.max(1e-4);
+        Self {
+            cloth_standoff_m: thickness_m,
+            cloth_outside_m: (self.cloth_outside_m * ratio).clamp(0.010, 0.040),
+            ..*self
+        }
+    }
+}
+
 /// What is known besides the picture.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Context<'a> {
@@ -272,6 +284,10 @@ impl Evidence {
         if context.grounded {
             sole_of_lower_foot(body, &self.floor_vertices, &mut self.soles);
         }
+    }
+
+    pub(crate) fn matches(&self) -> &[Match] {
+        &self.matches
     }
 
     /// Hands all terms over what was gathered to `use_terms`.

@@ -11,6 +11,7 @@ use crate::{
     solve::{Eliminated, NormalEquations, shorten},
     state::{ALL_UNKNOWNS, BETA_COUNT, BodyState, POSE_UNKNOWNS},
     surface::{PosedSurface, ShapedSurface, Surface},
+    thickness::Scatter,
 };
 
 /// When and from what the shape is estimated.
@@ -31,6 +32,8 @@ pub struct FitConfig {
     pub every: usize,
     /// How much the betas' standard normal prior counts, in independent measurements.
     pub shape_prior_weight: f32,
+    /// Whether the clothes' thickness is learned as well; otherwise it stays as the energy has it.
+    pub learns_thickness: bool,
 }
 
 impl Default for FitConfig {
@@ -43,6 +46,7 @@ impl Default for FitConfig {
             frames_a_call: 4,
             every: 3,
             shape_prior_weight: 2.0,
+            learns_thickness: true,
         }
     }
 }
@@ -70,6 +74,15 @@ struct Estimate {
     rounds_done: usize,
     /// Of the round's frames so far.
     parts: Vec<Option<Eliminated>>,
+    scatter: Scatter,
+}
+
+/// What the frames say about the person.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Learned {
+    pub(crate) betas: [f32; BETA_COUNT],
+    /// How far their clothes stand off on average, where that can be told.
+    pub(crate) thickness_m: Option<f32>,
 }
 
 /// What [`ShapeFit::advance`] needs to know of the frame it is called in.
@@ -105,14 +118,14 @@ impl ShapeFit {
         self.next_moment >= config.moments_secs.len() && self.running.is_none()
     }
 
-    /// Stores the frame if it is worth it and works on the estimate; returns new betas when there are some.
+    /// Stores the frame if it is worth it and works on the estimate; returns what was learned when an estimate is ready.
     pub(crate) fn advance(
         &mut self,
         moment: &Moment<'_>,
         config: &FitConfig,
         energy: &EnergyConfig,
         grounded: bool,
-    ) -> Option<[f32; BETA_COUNT]> {
+    ) -> Option<Learned> {
         if self.is_frozen(config) {
             self.views = Vec::new();
             return None;
@@ -123,19 +136,22 @@ impl ShapeFit {
             if due && self.views.len() >= 3.min(config.frames) {
                 self.next_moment += 1;
                 let betas = moment.state.betas;
-                self.running = Some(Estimate { betas, rounds_done: 0, parts: Vec::new() });
+                self.running = Some(Estimate {
+                    betas,
+                    rounds_done: 0,
+                    parts: Vec::new(),
+                    scatter: Scatter::default(),
+                });
             }
             return None;
         }
         let context = Context { energy, predicted: None, grounded, whole: true };
         self.work(config, &context);
-        let running = self.running.as_ref()?;
-        if running.rounds_done < config.rounds {
-            return None;
-        }
-        let betas = running.betas;
-        self.running = None;
-        Some(betas)
+        let running = self
+            .running
+            .take_if(|running| running.rounds_done >= config.rounds)?;
+        let Estimate { betas, scatter, .. } = running;
+        Some(Learned { betas, thickness_m: scatter.thickness_m() })
     }
 
     /// Follows the world when it moves.
@@ -146,6 +162,7 @@ impl ShapeFit {
         }
         if let Some(running) = &mut self.running {
             running.parts.clear();
+            running.scatter = Scatter::default();
         }
     }
 
@@ -183,11 +200,14 @@ impl ShapeFit {
             return;
         };
         let shaped = ShapedSurface::new(&self.surface, running.betas);
+        if running.parts.is_empty() {
+            running.scatter = Scatter::default();
+        }
         let open = self.views.iter().skip(running.parts.len());
-        let parts = open
-            .take(config.frames_a_call.max(1))
-            .map(|view| eliminated(view, &shaped, config, context));
-        running.parts.extend(parts);
+        for view in open.take(config.frames_a_call.max(1)) {
+            let part = eliminated(view, &shaped, config, context, &mut running.scatter);
+            running.parts.push(part);
+        }
         if running.parts.len() < self.views.len() {
             return;
         }
@@ -210,20 +230,25 @@ pub(crate) fn fit_one(
     let mut betas = state.betas;
     for _ in 0..config.rounds {
         let shaped = ShapedSurface::new(surface, betas);
-        let part = eliminated(&views[0], &shaped, config, context);
+        let part = eliminated(&views[0], &shaped, config, context, &mut Scatter::default());
         step(&shaped, &mut views, &[part], &mut betas, config);
     }
     views[0].state
 }
 
-/// One frame's system without its pose.
+/// One frame's system without its pose; the clothes' scatter as a by-product.
 fn eliminated(
     view: &StoredView,
     shaped: &ShapedSurface,
     config: &FitConfig,
     context: &Context<'_>,
+    scatter: &mut Scatter,
 ) -> Option<Eliminated> {
-    linearise(view, shaped, config, context).eliminate(POSE_UNKNOWNS, RELATIVE_DAMPING, 1e-3)
+    linearise(view, shaped, config, context, scatter).eliminate(
+        POSE_UNKNOWNS,
+        RELATIVE_DAMPING,
+        1e-3,
+    )
 }
 
 /// One Gauss-Newton step of all poses and the betas, from each frame's system without its pose. Returns how certain the
@@ -271,6 +296,7 @@ fn linearise(
     shaped: &ShapedSurface,
     config: &FitConfig,
     context: &Context<'_>,
+    scatter: &mut Scatter,
 ) -> NormalEquations {
     let observation = &view.observation;
     let body = PosedSurface::new(shaped, &view.state).with_shape_derivatives();
@@ -282,6 +308,7 @@ fn linearise(
     let mut evidence = Evidence::default();
     let points = thinned(&observation.points, config.every);
     evidence.gather(&body, &visibility, observation, &points, context);
+    scatter.add(&body, evidence.matches());
     evidence.with_terms(observation, context, |terms| {
         let mut system = NormalEquations::new(ALL_UNKNOWNS);
         for term in terms {

@@ -21,6 +21,7 @@ mod residual;
 mod solve;
 mod state;
 mod surface;
+mod thickness;
 mod world;
 
 pub use align::EnergyConfig;

@@ -12,6 +12,10 @@ pub struct FineTuneConfig {
     pub seed: u64,
     /// Adam steps.
     pub steps: u32,
+    /// The first so many of them look for who it is among the people that the prior knows, by `code_rates`: what is
+    /// found there comes with what poses do to such clothes.
+    pub code_steps: u32,
+    pub code_rates: RateConfig,
     /// Keyframes that a step learns from, drawn anew each time; 0 for all of them. With a few it is all: only where
     /// hundreds are learned from would each step take too long.
     pub frames_per_step: usize,
@@ -36,6 +40,8 @@ impl Default for FineTuneConfig {
         Self {
             seed: 1,
             steps: 150,
+            code_steps: 75,
+            code_rates: RateConfig::of_code(),
             frames_per_step: 0,
             warm_up_steps: 10,
             decay_share: 0.5,
@@ -50,10 +56,27 @@ impl Default for FineTuneConfig {
 }
 
 impl FineTuneConfig {
+    /// For a network that knows nobody, or does not know them apart: there is no code to look for, and all that no pose
+    /// changes has to be learned.
+    pub fn without_code(self) -> Self {
+        let rates = RateConfig {
+            static_share: 1.0,
+            code_share: self.rates.coefficient_share,
+            ..self.rates
+        };
+        Self { code_steps: 0, rates, ..self }
+    }
+
     /// The share of the rates at a step, counted from zero.
     pub(crate) fn rate_share(&self, step: u32) -> f32 {
+        let code_steps = self.code_steps.min(self.steps);
+        let (step, steps) = if step < code_steps {
+            (step, code_steps)
+        } else {
+            (step - code_steps, self.steps - code_steps)
+        };
         let warm = (step + 1) as f32 / self.warm_up_steps.max(1) as f32;
-        let left = self.steps.saturating_sub(step) as f32 / self.steps.max(1) as f32;
+        let left = steps.saturating_sub(step) as f32 / steps.max(1) as f32;
         let decay = if self.decay_share > 0.0 {
             left / self.decay_share
         } else {

@@ -50,7 +50,7 @@ impl SamplingConfig {
 /// A keyframe's points, cut into those that teach and those that judge.
 #[derive(Clone, Debug)]
 pub(crate) struct KeyframePoints {
-    surface: Vec<SurfacePoint>,
+    pub(crate) surface: Vec<SurfacePoint>,
     pub(crate) held_out: Vec<SurfacePoint>,
     free: Vec<Vec3>,
 }

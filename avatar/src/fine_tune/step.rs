@@ -76,6 +76,8 @@ pub fn fine_tune(
 pub struct FineTuner {
     network: HyperNetwork,
     optimizer: HyperOptimizer,
+    /// Of the steps that look for who it is, as long as they last.
+    code_optimizer: Option<HyperOptimizer>,
     gradients: FieldGradients,
     config: FineTuneConfig,
     metres_per_unit: f32,
@@ -100,7 +102,9 @@ impl FineTuner {
         let keyframes = sampling::keyframes(samples, config.held_out_share, &mut rng);
         let poses: Vec<_> = samples.iter().map(|s| s.pose).collect();
         let inputs = network.output_inputs(&poses);
+        let code_optimizer = || HyperOptimizer::new(&network, &inputs, &config.code_rates);
         Ok(Self {
+            code_optimizer: (config.code_steps > 0).then(code_optimizer),
             optimizer: HyperOptimizer::new(&network, &inputs, &config.rates),
             gradients: FieldGradients::new(network.config().field),
             network,
@@ -139,8 +143,12 @@ impl FineTuner {
             .collect();
         let gradient = self.network.backward(cache, &bars);
         let share = self.config.rate_share(self.step);
-        self.optimizer.step(&mut self.network, &gradient, share);
+        let optimizer = self.code_optimizer.as_mut().unwrap_or(&mut self.optimizer);
+        optimizer.step(&mut self.network, &gradient, share);
         self.step += 1;
+        if self.step >= self.config.code_steps {
+            self.code_optimizer = None;
+        }
         Ok(terms)
     }
 

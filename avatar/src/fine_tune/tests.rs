@@ -14,8 +14,11 @@ use crate::{
     sdf::{SirenConfig, SirenField},
 };
 
-const SMALL: HyperConfig =
-    HyperConfig { field: SirenConfig { hidden: 32, layers: 4 }, heads: HeadKind::LowRank(4) };
+const SMALL: HyperConfig = HyperConfig {
+    field: SirenConfig { hidden: 32, layers: 4 },
+    heads: HeadKind::LowRank(4),
+    person: 3,
+};
 
 /// A keyframe with the elbow bent by this much; the ball grows with it.
 fn keyframe(bend_rad: f32) -> CanonicalSamples {
@@ -58,7 +61,7 @@ fn config() -> FineTuneConfig {
             ..Default::default()
         },
         rates: RateConfig { field: 2e-3, ..RateConfig::everything() },
-        ..FineTuneConfig::default()
+        ..FineTuneConfig::default().without_code()
     }
 }
 
@@ -146,6 +149,37 @@ fn few_poses_say_little_about_what_poses_do() {
     assert!(few < 0.5 * many, "{few} {many}");
     assert_eq!(RateConfig::of_poses(500), RateConfig::everything());
     assert_eq!(RateConfig::default(), RateConfig::of_poses(8));
+}
+
+#[test]
+fn the_first_steps_look_for_who_it_is_and_leave_all_else() {
+    let of_code = FineTuneConfig { steps: 20, code_steps: 20, ..config() };
+    // Somebody is known already: an untrained basis says nothing of anybody.
+    let start = learned(&config());
+    let learned = |config: &FineTuneConfig| {
+        let mut ignore = |_: &_, _: &_| ControlFlow::Continue(());
+        fine_tune(
+            start.clone(),
+            &keyframes(),
+            1.0,
+            config,
+            &|| 0.0,
+            &mut ignore,
+        )
+        .unwrap()
+    };
+    let mut found = learned(&of_code);
+    assert_ne!(found.person, start.person);
+    found.person.clone_from(&start.person);
+    for (own, start) in found.heads.iter_mut().zip(&start.heads) {
+        let own = own.coefficients.as_mut().expect("a low-rank head");
+        let start = start.coefficients.as_ref().expect("a low-rank head");
+        assert_ne!(own.bias, start.bias);
+        own.bias.clone_from(&start.bias);
+    }
+    assert_eq!(found, start);
+    let longer = learned(&FineTuneConfig { steps: 40, ..of_code });
+    assert_ne!(longer.heads[0].output, start.heads[0].output);
 }
 
 #[test]

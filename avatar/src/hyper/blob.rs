@@ -126,6 +126,7 @@ fn check_bounds(config: &HyperConfig) -> Result<(), AvatarError> {
     let is_sane = (1..=MAX_HIDDEN).contains(&field.hidden)
         && (2..=MAX_LAYERS).contains(&field.layers)
         && (1..=MAX_HIDDEN).contains(&rank)
+        && config.person <= MAX_HIDDEN
         && config.head_parameter_count() <= MAX_PARAMETERS;
     if is_sane {
         Ok(())

@@ -25,18 +25,37 @@ pub enum HeadKind {
 pub struct HyperConfig {
     pub field: SirenConfig,
     pub heads: HeadKind,
+    /// Numbers that say who it is, which the heads see beside the pose: what a pose does to clothes depends on the
+    /// clothes. MetaAvatar has none.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub person: usize,
+}
+
+#[expect(
+    clippy::trivially_copy_pass_by_ref,
+    reason = "serde passes a reference"
+)]
+fn is_zero(count: &usize) -> bool {
+    *count == 0
 }
 
 impl HyperConfig {
     /// What we train and ship.
-    pub const LIVE: Self = Self { field: SirenConfig::LIVE, heads: HeadKind::LowRank(32) };
+    pub const LIVE: Self =
+        Self { field: SirenConfig::LIVE, heads: HeadKind::LowRank(32), person: 16 };
     /// MetaAvatar's: 85,599,489 parameters in the heads, 13,734 in the encoder.
-    pub const PAPER: Self = Self { field: SirenConfig::PAPER, heads: HeadKind::Full };
+    pub const PAPER: Self = Self { field: SirenConfig::PAPER, heads: HeadKind::Full, person: 0 };
+
+    /// What a head sees: the pose's code and the person's.
+    pub(crate) fn head_inputs(&self) -> usize {
+        CODE_SIZE + self.person
+    }
 
     /// Parameters of all heads.
     pub fn head_parameter_count(&self) -> usize {
         let norm = 2 * HEAD_WIDTH;
-        let trunk = linear(CODE_SIZE, HEAD_WIDTH) + linear(HEAD_WIDTH, HEAD_WIDTH) + 2 * norm;
+        let trunk =
+            linear(self.head_inputs(), HEAD_WIDTH) + linear(HEAD_WIDTH, HEAD_WIDTH) + 2 * norm;
         (0..self.field.layers)
             .map(|layer| {
                 let parameters = self.field.layer_parameters(layer);

@@ -1,15 +1,12 @@
-//! One head: the pose code becomes the residual of one layer of the field.
+//! One head: the codes of pose and person become the residual of one layer of the field.
 //!
-//! `144 -> 256 -> LayerNorm -> ReLU -> 256 -> LayerNorm -> ReLU`, then all parameters (the paper), or a few
+//! `144 + person -> 256 -> LayerNorm -> ReLU -> 256 -> LayerNorm -> ReLU`, then all parameters (the paper), or a few
 //! coefficients of which all parameters are a linear combination.
 
 use rand::Rng;
 use rand_distr::{Distribution as _, Normal};
 
-use super::{
-    config::{HEAD_WIDTH, HeadKind},
-    pose_encoder::CODE_SIZE,
-};
+use super::config::{HEAD_WIDTH, HeadKind, HyperConfig};
 use crate::nn::{
     layer_norm::{LayerNorm, NormCache},
     linear::{Linear, OuterGradient},
@@ -53,10 +50,10 @@ pub(crate) struct HeadGradient {
 
 impl Head {
     /// Its residual is zero for every pose.
-    pub(crate) fn init(kind: HeadKind, parameters: usize, rng: &mut impl Rng) -> Self {
-        let first = Linear::he(CODE_SIZE, HEAD_WIDTH, rng);
+    pub(crate) fn init(config: &HyperConfig, parameters: usize, rng: &mut impl Rng) -> Self {
+        let first = Linear::he(config.head_inputs(), HEAD_WIDTH, rng);
         let second = Linear::he(HEAD_WIDTH, HEAD_WIDTH, rng);
-        let (coefficients, output) = match kind {
+        let (coefficients, output) = match config.heads {
             HeadKind::Full => (None, Linear::zeros(HEAD_WIDTH, parameters)),
             HeadKind::LowRank(rank) => {
                 let normal = Normal::new(0.0, BASIS_DEVIATION).expect("a positive deviation");
@@ -76,13 +73,13 @@ impl Head {
     }
 
     /// All zeros: the frame that a file's tensors are read into.
-    pub(crate) fn zeros(kind: HeadKind, parameters: usize) -> Self {
-        let (coefficients, inputs) = match kind {
+    pub(crate) fn zeros(config: &HyperConfig, parameters: usize) -> Self {
+        let (coefficients, inputs) = match config.heads {
             HeadKind::Full => (None, HEAD_WIDTH),
             HeadKind::LowRank(rank) => (Some(Linear::zeros(HEAD_WIDTH, rank)), rank),
         };
         Self {
-            first: Linear::zeros(CODE_SIZE, HEAD_WIDTH),
+            first: Linear::zeros(config.head_inputs(), HEAD_WIDTH),
             first_norm: LayerNorm::zeros(HEAD_WIDTH),
             second: Linear::zeros(HEAD_WIDTH, HEAD_WIDTH),
             second_norm: LayerNorm::zeros(HEAD_WIDTH),
@@ -94,7 +91,7 @@ impl Head {
     /// What the basis is mixed with; `None` in a full head.
     ///
     /// # Shapes
-    /// `code` [rows, 144]; result [rows, rank]
+    /// `code` [rows, inputs]; result [rows, rank]
     pub(crate) fn coefficients(&self, code: &[f32]) -> Option<Vec<f32>> {
         let [_, second] = self.trunk(code);
         Some(self.coefficients.as_ref()?.forward(&second.output))
@@ -110,7 +107,7 @@ impl Head {
     }
 
     /// # Shapes
-    /// `code` [rows, 144]; `offsets` a coefficient vector a row, or none at all; result [rows, parameters]
+    /// `code` [rows, inputs]; `offsets` a coefficient vector a row, or none at all; result [rows, parameters]
     pub(crate) fn forward(&self, code: &[f32], offsets: &[&[f32]]) -> (HeadCache, Vec<f32>) {
         let [first, second] = self.trunk(code);
         let basis_input = match &self.coefficients {
@@ -133,7 +130,7 @@ impl Head {
     /// The gradients of the head's parameters, and of the code.
     ///
     /// # Shapes
-    /// `code` and the second result [rows, 144], `residual_bar` [rows, parameters]
+    /// `code` and the second result [rows, inputs], `residual_bar` [rows, parameters]
     pub(crate) fn backward(
         &self,
         code: &[f32],

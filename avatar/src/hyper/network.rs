@@ -22,6 +22,8 @@ pub struct HyperNetwork {
     /// phi*: the field before any residual.
     pub(crate) meta: Vec<f32>,
     pub(crate) encoder: PoseEncoder,
+    /// Who it is: what the heads see beside the pose.
+    pub(crate) person: Vec<f32>,
     /// One a layer of the field.
     pub(crate) heads: Vec<Head>,
     pub provenance: Provenance,
@@ -42,17 +44,21 @@ pub struct Provenance {
 /// What the backward pass of a batch of poses needs.
 pub(crate) struct HyperCache {
     encoder: EncoderCache,
+    /// What the heads see; [poses, inputs]
+    inputs: Vec<f32>,
     heads: Vec<HeadCache>,
 }
 
 /// Gradients of every trainable parameter.
 pub(crate) struct HyperGradient {
     pub(crate) encoder: EncoderGradient,
+    /// By each pose's person; [poses, person]
+    pub(crate) person: Vec<f32>,
     pub(crate) heads: Vec<HeadGradient>,
 }
 
 impl HyperGradient {
-    /// The gradient by each pose's code: that of its coefficients.
+    /// The gradient by each pose's code: by its coefficients, then by its person.
     pub(crate) fn code_bars(&self) -> Vec<Vec<f32>> {
         let poses = self.encoder.global.output_bar.len() / FEATURE_SIZE;
         let mut bars = vec![Vec::new(); poses];
@@ -63,6 +69,12 @@ impl HyperGradient {
         {
             let width = gradient.output_bar.len() / poses;
             for (bar, row) in bars.iter_mut().zip(gradient.output_bar.chunks_exact(width)) {
+                bar.extend(row);
+            }
+        }
+        let width = self.person.len() / poses;
+        if width > 0 {
+            for (bar, row) in bars.iter_mut().zip(self.person.chunks_exact(width)) {
                 bar.extend(row);
             }
         }
@@ -91,13 +103,20 @@ impl HyperNetwork {
         let encoder = PoseEncoder::init(rng);
         for layer in 0..config.field.layers {
             heads.push(Head::init(
-                config.heads,
+                &config,
                 config.field.layer_parameters(layer),
                 rng,
             ));
         }
         let meta = meta.parameters().to_vec();
-        Self { config, meta, encoder, heads, provenance: Provenance::default() }
+        Self {
+            person: vec![0.0; config.person],
+            config,
+            meta,
+            encoder,
+            heads,
+            provenance: Provenance::default(),
+        }
     }
 
     /// As it is before any learning.
@@ -141,9 +160,10 @@ impl HyperNetwork {
     /// are linear in them.
     pub fn coefficients(&self, pose: &PoseInput) -> Vec<f32> {
         let code = self.encoder.forward(std::slice::from_ref(pose)).code;
+        let inputs = self.head_inputs(&code, &[]);
         self.heads
             .iter()
-            .filter_map(|head| head.coefficients(&code))
+            .filter_map(|head| head.coefficients(&inputs))
             .flatten()
             .collect()
     }
@@ -163,13 +183,14 @@ impl HyperNetwork {
         self.forward_with_codes(poses, &[])
     }
 
-    /// [`Self::forward`] with a code for each pose added to its coefficients, or none at all.
+    /// [`Self::forward`] with a code for each pose added to its coefficients and its person, or none at all.
     pub(crate) fn forward_with_codes(
         &self,
         poses: &[PoseInput],
         codes: &[&[f32]],
     ) -> (HyperCache, Vec<Vec<f32>>) {
         let encoder = self.encoder.forward(poses);
+        let inputs = self.head_inputs(&encoder.code, codes);
         let heads: Vec<_> = self
             .heads
             .par_iter()
@@ -177,7 +198,7 @@ impl HyperNetwork {
             .map(|(layer, head)| {
                 let range = self.code_range(layer);
                 let codes: Vec<&[f32]> = codes.iter().map(|code| &code[range.clone()]).collect();
-                head.forward(&encoder.code, &codes)
+                head.forward(&inputs, &codes)
             })
             .collect();
         let mut parameters = vec![self.meta.clone(); poses.len()];
@@ -190,15 +211,14 @@ impl HyperNetwork {
             }
         }
         let heads = heads.into_iter().map(|(cache, _)| cache).collect();
-        (HyperCache { encoder, heads }, parameters)
+        (HyperCache { encoder, inputs, heads }, parameters)
     }
 
     /// Gradients from those of each pose's field parameters.
     pub(crate) fn backward(&self, cache: HyperCache, parameter_bars: &[&[f32]]) -> HyperGradient {
-        let HyperCache { encoder, heads } = cache;
-        let code = &encoder.code;
+        let HyperCache { encoder, inputs, heads } = cache;
         let layers: Vec<_> = self.heads.iter().zip(heads).enumerate().collect();
-        let (gradients, code_bars): (Vec<_>, Vec<_>) = layers
+        let (gradients, input_bars): (Vec<_>, Vec<_>) = layers
             .into_par_iter()
             .map(|(layer, (head, cache))| {
                 let range = self.config.field.layer_range(layer);
@@ -207,20 +227,52 @@ impl HyperNetwork {
                     .flat_map(|bar| &bar[range.clone()])
                     .copied()
                     .collect();
-                head.backward(code, cache, residual_bar)
+                head.backward(&inputs, cache, residual_bar)
             })
             .unzip();
-        let mut code_bar = vec![0.0; parameter_bars.len() * CODE_SIZE];
-        for part in &code_bars {
-            for (sum, bar) in code_bar.iter_mut().zip(part) {
+        let mut input_bar = vec![0.0; inputs.len()];
+        for part in &input_bars {
+            for (sum, bar) in input_bar.iter_mut().zip(part) {
                 *sum += bar;
             }
         }
-        HyperGradient { encoder: self.encoder.backward(encoder, code_bar), heads: gradients }
+        let (mut code_bar, mut person_bar) = (Vec::new(), Vec::new());
+        for row in input_bar.chunks_exact(self.config.head_inputs()) {
+            let (code, person) = row.split_at(CODE_SIZE);
+            code_bar.extend(code);
+            person_bar.extend(person);
+        }
+        HyperGradient {
+            encoder: self.encoder.backward(encoder, code_bar),
+            person: person_bar,
+            heads: gradients,
+        }
     }
 
-    /// Coefficients of all heads together; zero for full heads.
+    /// Each pose's code, and who it is: the network's own person, moved by that part of the pose's code.
+    fn head_inputs(&self, pose_codes: &[f32], codes: &[&[f32]]) -> Vec<f32> {
+        let mut inputs = Vec::new();
+        for (row, pose_code) in pose_codes.chunks_exact(CODE_SIZE).enumerate() {
+            inputs.extend(pose_code);
+            let start = inputs.len();
+            inputs.extend(&self.person);
+            if let Some(code) = codes.get(row) {
+                let moved = inputs[start..]
+                    .iter_mut()
+                    .zip(&code[self.coefficient_count()..]);
+                moved.for_each(|(x, offset)| *x += offset);
+            }
+        }
+        inputs
+    }
+
+    /// Numbers of a code: the coefficients of all heads, none for full heads, then the person.
     pub(crate) fn code_size(&self) -> usize {
+        self.coefficient_count() + self.config.person
+    }
+
+    /// Of all heads together; zero for full heads.
+    pub(crate) fn coefficient_count(&self) -> usize {
         self.code_range(self.heads.len()).start
     }
 
@@ -231,8 +283,13 @@ impl HyperNetwork {
         start..start + self.heads.get(head).map_or(0, size)
     }
 
-    /// Makes a code part of the network: it moves into the coefficients' biases.
+    /// Makes a code part of the network: it moves into the coefficients' biases and the person.
     pub(crate) fn add_code(&mut self, code: &[f32]) {
+        let person = &code[self.coefficient_count()..];
+        self.person
+            .iter_mut()
+            .zip(person)
+            .for_each(|(x, offset)| *x += offset);
         for head in 0..self.heads.len() {
             let range = self.code_range(head);
             if let Some(layer) = &mut self.heads[head].coefficients {
@@ -245,7 +302,7 @@ impl HyperNetwork {
         }
     }
 
-    /// Trainable parameters: encoder and heads.
+    /// Trainable parameters: encoder, person and heads.
     pub fn parameter_count(&self) -> usize {
         self.tensors()
             .iter()
@@ -256,11 +313,12 @@ impl HyperNetwork {
 
     /// An all-zero network that a file's tensors are read into.
     pub(crate) fn zeros(config: HyperConfig) -> Self {
-        let layer = |l| Head::zeros(config.heads, config.field.layer_parameters(l));
+        let layer = |l| Head::zeros(&config, config.field.layer_parameters(l));
         Self {
             config,
             meta: vec![0.0; config.field.parameter_count()],
             encoder: PoseEncoder::zeros(),
+            person: vec![0.0; config.person],
             heads: (0..config.field.layers).map(layer).collect(),
             provenance: Provenance::default(),
         }
@@ -277,6 +335,13 @@ impl HyperNetwork {
         for (joint, [hidden, output]) in self.encoder.joints.iter().enumerate() {
             push_linear(&mut list, &format!("encoder.{joint}.hidden"), hidden);
             push_linear(&mut list, &format!("encoder.{joint}.output"), output);
+        }
+        if !self.person.is_empty() {
+            list.push(Tensor {
+                name: "person".to_owned(),
+                shape: vec![self.person.len()],
+                values: self.person.as_slice(),
+            });
         }
         for (layer, head) in self.heads.iter().enumerate() {
             push_linear(&mut list, &format!("head.{layer}.first"), &head.first);
@@ -312,6 +377,9 @@ impl HyperNetwork {
         ]);
         for layer in self.encoder.joints.iter_mut().flatten() {
             list.extend([&mut layer.weight, &mut layer.bias]);
+        }
+        if !self.person.is_empty() {
+            list.push(&mut self.person);
         }
         for head in &mut self.heads {
             for layer in [&mut head.first, &mut head.second] {
@@ -370,8 +438,11 @@ mod tests {
     use super::*;
     use crate::{hyper::HeadKind, nn::linear::OuterGradient, sdf::SirenConfig};
 
-    const SMALL: HyperConfig =
-        HyperConfig { field: SirenConfig { hidden: 16, layers: 3 }, heads: HeadKind::LowRank(4) };
+    const SMALL: HyperConfig = HyperConfig {
+        field: SirenConfig { hidden: 16, layers: 3 },
+        heads: HeadKind::LowRank(4),
+        person: 3,
+    };
 
     fn pose(rng: &mut StdRng) -> PoseInput {
         let mut vector =
@@ -403,7 +474,10 @@ mod tests {
     #[test]
     fn field_is_exactly_the_meta_field_before_any_training() {
         let mut rng = StdRng::seed_from_u64(1);
-        for config in [SMALL, HyperConfig { heads: HeadKind::Full, ..SMALL }] {
+        for config in [
+            SMALL,
+            HyperConfig { heads: HeadKind::Full, person: 0, ..SMALL },
+        ] {
             let network = network(config, &mut rng);
             assert_eq!(network.field(&pose(&mut rng)), network.meta_field());
         }
@@ -444,6 +518,16 @@ mod tests {
                 .zip(layers)
                 .for_each(|(gradient, layer)| linear(gradient, layer));
         }
+        if !network.person.is_empty() {
+            let mut person = vec![0.0; network.person.len()];
+            for row in gradient.person.chunks_exact(person.len()) {
+                person
+                    .iter_mut()
+                    .zip(row)
+                    .for_each(|(sum, bar)| *sum += bar);
+            }
+            list.push(person);
+        }
         for (gradient, head) in gradient.heads.iter().zip(&network.heads) {
             let mut part = Vec::new();
             for (gradient, layer) in [
@@ -470,7 +554,10 @@ mod tests {
     #[test]
     fn gradients_match_finite_differences() {
         let mut rng = StdRng::seed_from_u64(2);
-        for config in [SMALL, HyperConfig { heads: HeadKind::Full, ..SMALL }] {
+        for config in [
+            SMALL,
+            HyperConfig { heads: HeadKind::Full, person: 0, ..SMALL },
+        ] {
             let mut network = moved(config, &mut rng);
             let poses = [pose(&mut rng), pose(&mut rng), pose(&mut rng)];
             let bars: Vec<Vec<f32>> = (0..poses.len())
@@ -546,8 +633,9 @@ mod tests {
     fn parameter_count_is_the_configurations() {
         let mut rng = StdRng::seed_from_u64(3);
         let network = network(HyperConfig::LIVE, &mut rng);
-        let expected =
-            HyperConfig::LIVE.head_parameter_count() + HyperConfig::encoder_parameter_count();
+        let expected = HyperConfig::LIVE.head_parameter_count()
+            + HyperConfig::encoder_parameter_count()
+            + HyperConfig::LIVE.person;
         assert_eq!(network.parameter_count(), expected);
     }
 

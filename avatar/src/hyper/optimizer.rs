@@ -29,16 +29,22 @@ pub struct RateConfig {
     pub static_share: f32,
     /// The part of it which comes through the basis.
     pub basis_share: f32,
-    /// The part of it which comes through the coefficients.
+    /// The part of it which comes through the coefficients, as far as poses decide on them...
     pub coefficient_share: f32,
+    /// ...and as far as they do not: through their biases, where a person's code is.
+    pub code_share: f32,
     /// Of the heads' hidden layers, and their norms.
     pub trunk: f32,
     /// Of the pose encoder (MetaAvatar).
     pub encoder: f32,
+    /// Of the numbers that say who it is.
+    pub person: f32,
 }
 
 /// With so many poses every part learns at the same pace.
 const MANY_POSES: f32 = 128.0;
+/// What no pose changes learns at this share of the pace at least.
+const LEAST_STATIC_SHARE: f32 = 0.3;
 /// What somebody is learned from live.
 const FEW_POSES: usize = 8;
 
@@ -50,8 +56,10 @@ impl RateConfig {
             static_share: 1.0,
             basis_share: 1.0,
             coefficient_share: 1.0,
+            code_share: 1.0,
             trunk: 1e-5,
             encoder: 1e-4,
+            person: 1e-2,
         }
     }
 
@@ -60,12 +68,32 @@ impl RateConfig {
     pub fn of_poses(poses: usize) -> Self {
         let everything = Self::everything();
         let share = (poses as f32 / MANY_POSES).min(1.0);
+        // What no pose changes would take up what poses do in these few views as well.
+        let static_share = share.max(LEAST_STATIC_SHARE);
         Self {
+            static_share,
             basis_share: share,
             coefficient_share: share,
+            code_share: static_share,
             trunk: share * everything.trunk,
             encoder: share * everything.encoder,
             ..everything
+        }
+    }
+}
+
+impl RateConfig {
+    /// Nothing but who it is.
+    pub fn of_code() -> Self {
+        Self {
+            field: 1e-3,
+            static_share: 0.0,
+            basis_share: 0.0,
+            coefficient_share: 0.0,
+            code_share: 1.0,
+            trunk: 0.0,
+            encoder: 0.0,
+            person: 2e-2,
         }
     }
 }
@@ -99,10 +127,12 @@ impl HeadRates {
         };
         let weights = &head.output.weight;
         let row = weights.iter().map(|x| x.abs()).sum::<f32>() / head.output.outputs as f32;
-        let coefficient = config.field * config.coefficient_share / row.max(1e-6);
+        let coefficient = config.field / row.max(1e-6);
         let hidden = head.second_norm.scale.len() as f32;
-        let coefficients =
-            LinearRates { weight: coefficient / (hidden * MEAN_ACTIVATION), bias: coefficient };
+        let coefficients = LinearRates {
+            weight: coefficient * config.coefficient_share / (hidden * MEAN_ACTIVATION),
+            bias: coefficient * config.code_share,
+        };
         Self { coefficients, output }
     }
 }
@@ -115,6 +145,7 @@ pub(crate) struct HyperOptimizer {
     number: u32,
     head_rates: Vec<HeadRates>,
     encoder: Vec<LinearMoments>,
+    person: Moments,
     heads: Vec<HeadMoments>,
 }
 
@@ -152,6 +183,7 @@ impl HyperOptimizer {
             number: 0,
             head_rates,
             encoder,
+            person: Moments::zeros(network.person.len()),
             heads: network.heads.iter().map(HeadMoments::new).collect(),
         }
     }
@@ -166,6 +198,7 @@ impl HyperOptimizer {
         self.number += 1;
         let step = AdamStep::new(self.adam, self.number);
         self.step_encoder(network, &gradient.encoder, &step, share);
+        self.step_person(network, &gradient.person, &step, share);
         let parts = network
             .heads
             .iter_mut()
@@ -249,7 +282,29 @@ impl HyperOptimizer {
                 .into_iter()
                 .chain(linear.flat_map(|l| [&mut l.weight, &mut l.bias]))
         });
-        encoder.chain(heads)
+        encoder.chain([&mut self.person]).chain(heads)
+    }
+
+    /// `rows`: gradients of the batch's poses; [poses, person]
+    fn step_person(
+        &mut self,
+        network: &mut HyperNetwork,
+        rows: &[f32],
+        step: &AdamStep,
+        share: f32,
+    ) {
+        if network.person.is_empty() {
+            return;
+        }
+        let mut gradient = vec![0.0; network.person.len()];
+        for row in rows.chunks_exact(gradient.len()) {
+            gradient
+                .iter_mut()
+                .zip(row)
+                .for_each(|(sum, bar)| *sum += bar);
+        }
+        let rate = self.rates.person * share;
+        self.person.step(step, rate, &gradient, &mut network.person);
     }
 
     fn step_encoder(

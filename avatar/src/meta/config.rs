@@ -99,8 +99,9 @@ pub struct JointConfig {
     /// People of one step, and poses of each.
     pub people_per_step: usize,
     pub frames_per_person: usize,
-    /// Rate of a person's code.
+    /// Rates of a person's code: of its coefficients, and of what the heads see of it.
     pub code_rate: f32,
+    pub person_rate: f32,
     /// Weight of the code's mean square in the loss: keeps people near each other, so that a new one is near.
     pub code_penalty: f32,
     pub rates: RateConfig,
@@ -112,16 +113,19 @@ impl Default for JointConfig {
     fn default() -> Self {
         Self {
             people: 150,
-            frames: 16,
-            steps: 5000,
+            frames: 48,
+            steps: 8000,
             people_per_step: 4,
             frames_per_person: 2,
             code_rate: 5e-3,
+            person_rate: 2e-2,
             code_penalty: 1e-3,
             rates: RateConfig {
                 field: 3e-4,
                 static_share: 0.3,
                 trunk: 5e-5,
+                // Everybody has a person of their own.
+                person: 0.0,
                 ..RateConfig::everything()
             },
             decay_share: 0.5,

@@ -1,8 +1,9 @@
 //! Stage `Joint`: one hypernetwork for many people, each with a code of their own.
 //!
-//! A person's code is added to the coefficients of every head, so that the shared basis spans both how people
-//! differ and how their surfaces follow the pose. Fine-tuning finds a new person's code in the coefficients'
-//! bias, which starts at the mean of all codes.
+//! One part of a person's code is added to the coefficients of every head, so that the shared basis spans both how people
+//! differ and how their surfaces follow the pose. The heads see the other part beside the pose: what a pose does depends
+//! on who it is and what they wear. Fine-tuning finds a new person's code in the coefficients' bias and the network's
+//! person, which start at the mean of all codes.
 
 use rand::{RngExt as _, rngs::StdRng, seq::SliceRandom as _};
 use rayon::prelude::*;
@@ -26,7 +27,7 @@ use crate::{
 pub(super) struct Joint {
     network: HyperNetwork,
     optimizer: HyperOptimizer,
-    /// One a person: the coefficients of all heads, one after the other.
+    /// One a person: the coefficients of all heads, one after the other, then what the heads see.
     codes: Vec<Vec<f32>>,
     code_moments: Vec<Moments>,
     /// Steps each code has taken.
@@ -102,9 +103,13 @@ impl Joint {
             .zip(bars.chunks(joint.frames_per_person));
         for (frames, bars) in rows {
             let person = frames[0].0;
+            let coefficients = self.network.coefficient_count();
             let code = &mut self.codes[person];
-            let penalty = 2.0 * joint.code_penalty / code.len() as f32;
-            let mut gradient: Vec<f32> = code.iter().map(|x| penalty * x).collect();
+            let mut gradient: Vec<f32> = Vec::with_capacity(code.len());
+            for part in [&code[..coefficients], &code[coefficients..]] {
+                let penalty = 2.0 * joint.code_penalty / part.len().max(1) as f32;
+                gradient.extend(part.iter().map(|x| penalty * x));
+            }
             for bar in bars {
                 gradient
                     .iter_mut()
@@ -113,7 +118,8 @@ impl Joint {
             }
             self.code_steps[person] += 1;
             let step = AdamStep::new(AdamConfig::default(), self.code_steps[person]);
-            self.code_moments[person].step(&step, joint.code_rate * share, &gradient, code);
+            let rates = [joint.code_rate * share, joint.person_rate * share];
+            self.code_moments[person].step_parts(&step, (coefficients, rates), &gradient, code);
         }
     }
 }
@@ -200,4 +206,101 @@ fn rate_share(number: u32, config: &PriorConfig) -> f32 {
     let warm = (number + 1) as f32 / 50.0;
     let left = joint.steps.saturating_sub(number) as f32 / joint.steps.max(1) as f32;
     warm.min(1.0) * (left / joint.decay_share.max(1e-6)).min(1.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use effigy_registration::smpl::JOINT_COUNT;
+    use glam::{Mat3, Vec3};
+    use rand::SeedableRng as _;
+
+    use super::*;
+    use crate::{
+        PoseInput, SignedDistanceField as _,
+        fine_tune::{SamplingConfig, sampling::random_in_box},
+        hyper::{HeadKind, HyperConfig, RateConfig},
+        meta::{JointConfig, Person, PersonFrame},
+        sdf::SirenConfig,
+    };
+
+    fn pose(bend_rad: f32) -> PoseInput {
+        let mut rotations = [Mat3::IDENTITY; JOINT_COUNT];
+        rotations[1] = Mat3::from_rotation_x(bend_rad);
+        PoseInput { rotations, joints_in_unit: [Vec3::ZERO; JOINT_COUNT] }
+    }
+
+    /// A ball that a bent joint makes larger or smaller, depending on who it is.
+    fn ball(number: u64, frames: usize) -> Person {
+        let mut rng = StdRng::seed_from_u64(number);
+        let gain = if (number / 2).is_multiple_of(2) {
+            0.1
+        } else {
+            -0.1
+        };
+        let frame = |index: usize| {
+            let bend_rad = index as f32 / (frames - 1) as f32;
+            let normals: Vec<Vec3> = (0..300)
+                .map(|_| random_in_box(&mut rng).normalize_or(Vec3::X))
+                .collect();
+            let points = normals
+                .iter()
+                .map(|n| *n * (0.5 + gain * bend_rad))
+                .collect();
+            PersonFrame { pose: pose(bend_rad), points_in_unit: points, normals }
+        };
+        Person { frames: (0..frames).map(frame).collect() }
+    }
+
+    /// Mean distance of all people's points to what was learned of them.
+    fn error(person_numbers: usize) -> f32 {
+        let config = PriorConfig {
+            network: HyperConfig {
+                field: SirenConfig { hidden: 16, layers: 3 },
+                heads: HeadKind::LowRank(4),
+                person: person_numbers,
+            },
+            sampling: SamplingConfig {
+                surface: 96,
+                near: 64,
+                free: 0,
+                uniform: 32,
+                ..SamplingConfig::default()
+            },
+            joint: JointConfig {
+                people: 6,
+                frames: 4,
+                steps: 600,
+                people_per_step: 3,
+                rates: RateConfig { field: 2e-3, trunk: 1e-3, ..JointConfig::default().rates },
+                ..JointConfig::default()
+            },
+            ..PriorConfig::default()
+        };
+        let mut rng = StdRng::seed_from_u64(1);
+        let start = SirenField::init(config.network.field, &mut rng);
+        let mut joint = Joint::new(start.parameters().to_vec(), &config, &ball);
+        for number in 0..config.joint.steps {
+            joint.step(number, &config, &ball).unwrap();
+        }
+        let (mut sum, mut count) = (0.0, 0.0);
+        for (person, code) in joint.people.iter().zip(&joint.codes) {
+            let codes = vec![code.as_slice(); person.poses.len()];
+            let (_, fields) = joint.network.forward_with_codes(&person.poses, &codes);
+            for (frame, parameters) in person.points.iter().zip(fields) {
+                let points: Vec<Vec3> = frame.surface.iter().map(|at| at.point).collect();
+                let mut values = vec![0.0; points.len()];
+                SirenField::new(config.network.field, parameters).values(&points, &mut values);
+                sum += values.iter().map(|value| value.abs()).sum::<f32>();
+                count += values.len() as f32;
+            }
+        }
+        sum / count
+    }
+
+    #[test]
+    fn what_a_pose_does_depends_on_who_it_is() {
+        let (told, untold) = (error(3), error(0));
+        println!("{told} told who it is, {untold} untold");
+        assert!(told < 0.5 * untold, "{told} {untold}");
+    }
 }

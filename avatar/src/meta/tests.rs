@@ -50,6 +50,7 @@ fn config() -> PriorConfig {
         network: HyperConfig {
             field: SirenConfig { hidden: 16, layers: 3 },
             heads: HeadKind::LowRank(4),
+            person: 3,
         },
         sampling,
         reptile: ReptileConfig {

@@ -38,13 +38,14 @@ pub struct Validated {
 }
 
 impl Validation {
-    /// Everybody's default: few steps, since what is asked for is a good start.
+    /// Few steps, since what is asked for is a good start; all at one pace, so that the first stage, which knows nobody
+    /// apart, is judged alike.
     pub fn new(people: Vec<HeldOut>) -> Self {
         let fine_tune = FineTuneConfig {
             steps: 100,
             held_out_share: 0.0,
             held_out_every: u32::MAX,
-            ..FineTuneConfig::default()
+            ..FineTuneConfig::default().without_code()
         };
         Self { people, fine_tune }
     }

@@ -77,17 +77,33 @@ impl Moments {
         gradient: &[f32],
         values: &mut [f32],
     ) {
-        simd::run(
-            #[inline(always)]
-            || {
-                let moments = self.mean.iter_mut().zip(&mut self.square);
-                for ((value, gradient), (mean, square)) in
-                    values.iter_mut().zip(gradient).zip(moments)
-                {
-                    step.update(rate, *gradient, value, mean, square);
-                }
-            },
-        );
+        self.step_parts(step, (values.len(), [rate, 0.0]), gradient, values);
+    }
+
+    /// One step with a rate for the first so many parameters and another for the rest.
+    pub(crate) fn step_parts(
+        &mut self,
+        step: &AdamStep,
+        (first, rates): (usize, [f32; 2]),
+        gradient: &[f32],
+        values: &mut [f32],
+    ) {
+        let parts = [0..first, first..values.len()];
+        for (part, rate) in parts.into_iter().zip(rates) {
+            let (values, gradient) = (&mut values[part.clone()], &gradient[part.clone()]);
+            let (mean, square) = (&mut self.mean[part.clone()], &mut self.square[part]);
+            simd::run(
+                #[inline(always)]
+                || {
+                    let moments = mean.iter_mut().zip(square.iter_mut());
+                    for ((value, gradient), (mean, square)) in
+                        values.iter_mut().zip(gradient).zip(moments)
+                    {
+                        step.update(rate, *gradient, value, mean, square);
+                    }
+                },
+            );
+        }
     }
 }
 

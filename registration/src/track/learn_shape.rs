@@ -5,7 +5,7 @@ use effigy_capture::Timestamp;
 use super::{Tracker, phase::Following};
 use crate::{
     align::{Context, Effort, align},
-    fit::Moment,
+    fit::{Learned, Moment},
     observe::Observation,
 };
 
@@ -27,12 +27,18 @@ impl Tracker {
         };
         let grounded = self.world.is_grounded();
         let config = &self.config;
-        let Some(betas) = self
-            .shape
-            .advance(&moment, &config.fit, &config.energy, grounded)
+        let Some(Learned { betas, thickness_m }) =
+            self.shape
+                .advance(&moment, &config.fit, &self.clothes, grounded)
         else {
             return;
         };
+        if let (Some(thickness_m), true) = (thickness_m, config.fit.learns_thickness) {
+            self.clothes = config.energy.with_clothes(thickness_m);
+            if self.worn.is_none() {
+                self.energy = self.clothes;
+            }
+        }
         let old_pelvis = self.shaped.rest_joints[0];
         self.shaped = self.dressed(&self.surface, betas);
         let shift = old_pelvis - self.shaped.rest_joints[0];

@@ -43,7 +43,9 @@ pub struct Tracker {
     shape_known: bool,
     /// For each of the model's vertices how far the surface that is followed is off it in the zero pose.
     worn: Option<Arc<[Vec3]>>,
-    /// The configured energy, or what it becomes for a surface that is known.
+    /// The configured energy, with this person's clothes as far as they are known.
+    clothes: EnergyConfig,
+    /// The same, or what it becomes for a surface that is known.
     energy: EnergyConfig,
     first_track: Option<Timestamp>,
     phase: Phase,
@@ -69,6 +71,7 @@ impl Tracker {
             search_surface,
             shape_known: false,
             worn: None,
+            clothes: config.energy,
             energy: config.energy,
             first_track: None,
             phase: Phase::Searching { since: None, last_try: None, last_seen: None },
@@ -94,7 +97,8 @@ impl Tracker {
     /// Starts anew with another person; what is known of the floor stays.
     pub fn forget_person(&mut self) {
         self.worn = None;
-        self.energy = self.config.energy;
+        self.clothes = self.config.energy;
+        self.energy = self.clothes;
         self.shaped = self.dressed(&self.surface, [0.0; BETA_COUNT]);
         self.shape = ShapeFit::new(Arc::clone(&self.surface));
         self.shape_known = false;

@@ -39,7 +39,7 @@ impl Tracker {
     /// Aligns to the bare body again, allowing for clothes.
     pub fn forget_surface(&mut self) {
         self.worn = None;
-        self.energy = self.config.energy;
+        self.energy = self.clothes;
         self.shaped = self.dressed(&self.surface, self.shaped.betas);
     }
 

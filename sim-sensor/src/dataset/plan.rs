@@ -16,6 +16,8 @@ use crate::{
 pub enum DatasetPreset {
     /// To learn a prior from: many people, few frames each.
     Prior,
+    /// To learn from what poses do to clothes: as many people, each in several actions.
+    PriorActions,
     /// In the manner of CAPE: ten people to learn from, four to fine-tune and test on, actions split as in MetaAvatar.
     CapeLike,
     /// To choose settings by: three people whom neither training nor the tests ever meet.
@@ -138,7 +140,9 @@ const EXTRAPOLATED_ACTIONS: [Routine; 3] =
 impl DatasetPlan {
     pub fn new(preset: DatasetPreset, seed: u64) -> Self {
         let sequences = match preset {
-            DatasetPreset::Prior => prior(seed),
+            DatasetPreset::Prior => learned_from(seed, (60, 40), &[0]),
+            // Any two of the twelve actions are done by somebody: all differences are among these.
+            DatasetPreset::PriorActions => learned_from(seed, (64, 32), &[0, 1, 4, 6]),
             DatasetPreset::CapeLike => cape_like(seed),
             DatasetPreset::Dev => dev(seed),
             DatasetPreset::Small => small(seed),
@@ -156,26 +160,28 @@ impl DatasetPlan {
     }
 }
 
-/// People of all shapes in every outfit of the training split, each doing one thing.
-fn prior(seed: u64) -> Vec<SequencePlan> {
-    const PEOPLE: u32 = 60;
-    const FRAMES: u32 = 40;
+/// People of all shapes in every outfit of the training split, each of `people` doing the actions that come `apart` after
+/// their first, so many frames of each.
+fn learned_from(seed: u64, (people, frames): (u32, u32), apart: &[usize]) -> Vec<SequencePlan> {
     let outfits = training_outfits();
+    let actions = LEARNED_ACTIONS.len();
     let random = Randomness::new(seed, 0, 0xda7a);
-    (0..PEOPLE)
-        .map(|person| {
-            let (round, number) = (
-                person as usize / outfits.len(),
-                person as usize % outfits.len(),
-            );
-            let outfit = outfits[number];
-            // Each outfit gets another action each time it is worn: 5 and 12 have no common divisor.
-            let shift = (random.uniform(0) * LEARNED_ACTIONS.len() as f32) as usize;
-            let action = LEARNED_ACTIONS[(5 * round + 3 * number + shift) % LEARNED_ACTIONS.len()];
-            let wearer = Wearer { split: Split::Train, subject: person, outfit };
-            sequence(seed, wearer, action, Role::FineTune, FRAMES)
-        })
-        .collect()
+    let shift = (random.uniform(0) * actions as f32) as usize;
+    let mut sequences = Vec::new();
+    for person in 0..people {
+        let (round, number) = (
+            person as usize / outfits.len(),
+            person as usize % outfits.len(),
+        );
+        let wearer = Wearer { split: Split::Train, subject: person, outfit: outfits[number] };
+        // Each outfit gets another action each time it is worn: 5 and 12 have no common divisor.
+        let first = 5 * round + 3 * number + shift;
+        for apart in apart {
+            let action = LEARNED_ACTIONS[(first + apart) % actions];
+            sequences.push(sequence(seed, wearer, action, Role::FineTune, frames));
+        }
+    }
+    sequences
 }
 
 /// Ten people in two outfits each to learn from; four in two or three to fine-tune and test on.

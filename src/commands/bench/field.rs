@@ -103,7 +103,7 @@ fn training(name: &str, config: HyperConfig, rounds: usize) -> anyhow::Result<Ve
             uniform: POINTS / 4,
             ..SamplingConfig::default()
         },
-        ..FineTuneConfig::default()
+        ..FineTuneConfig::default().without_code()
     };
     let (subject, samples) = keyframes(&mut rng)?;
     let network = HyperNetwork::untrained(config, SEED);

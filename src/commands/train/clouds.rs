@@ -17,7 +17,9 @@ use glam::{Quat, Vec3};
 use rand::{Rng as _, RngExt as _, SeedableRng as _, rngs::StdRng};
 use rand_distr::{Distribution as _, StandardNormal};
 
-/// Of so many training sequences, one is held out.
+use super::people::by_person;
+
+/// Of so many training people, one is held out, in all they do.
 const HELD_OUT_EVERY: usize = 10;
 
 /// All training sequences of a data set.
@@ -38,19 +40,26 @@ struct Place {
 impl Clouds {
     /// Reads the training people, never the test people.
     pub(crate) fn load(dataset: &Dataset, points: usize, seed: u64) -> anyhow::Result<Self> {
-        let entries = &dataset.manifest().sequences;
-        let sequences = entries
-            .iter()
-            .filter(|entry| entry.plan.split == Split::Train)
-            .map(|entry| Ok(dataset.load(entry)?))
-            .collect::<anyhow::Result<Vec<_>>>()?;
-        let (held_out, training): (Vec<_>, Vec<_>) =
-            (0..sequences.len()).partition(|number| number % HELD_OUT_EVERY == HELD_OUT_EVERY - 1);
-        if held_out.is_empty() {
+        let entries = dataset.manifest().sequences.iter();
+        let people = by_person(entries.filter(|entry| entry.plan.split == Split::Train));
+        if people.len() < HELD_OUT_EVERY {
             bail!(
-                "{} training sequences in this data set, expected {HELD_OUT_EVERY} or more; make one with `effigy dataset make --preset prior`",
-                sequences.len()
+                "{} training people in this data set, expected {HELD_OUT_EVERY} or more; make one with `effigy dataset make --preset prior`",
+                people.len()
             );
+        }
+        let (mut sequences, mut training, mut held_out) = (Vec::new(), Vec::new(), Vec::new());
+        for (number, entries) in people.into_iter().enumerate() {
+            let is_held_out = number % HELD_OUT_EVERY == HELD_OUT_EVERY - 1;
+            for entry in entries {
+                let part = if is_held_out {
+                    &mut held_out
+                } else {
+                    &mut training
+                };
+                part.push(sequences.len());
+                sequences.push(dataset.load(entry)?);
+            }
         }
         Ok(Self { sequences, training, held_out, points, seed })
     }

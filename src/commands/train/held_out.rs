@@ -17,10 +17,10 @@ use crate::{
     pipeline::{evaluate::evenly_placed, settings::Settings},
 };
 
-/// Of this many training people in a row one is held out.
+/// Of this many training people in a row one is held out, in all they do.
 const ONE_IN: usize = 15;
 
-/// Frames that fine-tuning sees, from eight sides, and that it is judged on.
+/// Frames that fine-tuning sees, from eight sides, and that it is judged on: of other actions, where there are several.
 const FRAMES: usize = 8;
 
 /// Whether a training person judges instead of teaching.
@@ -38,11 +38,13 @@ pub(super) struct Judge {
 }
 
 impl Judge {
+    /// `sequences`: all that one person does.
     pub(super) fn new(
-        sequence: &Sequence,
+        sequences: &[Sequence],
         body: &Arc<BodyModel>,
         settings: &Settings,
     ) -> anyhow::Result<Self> {
+        let sequence = sequences.first().context("a person without sequences")?;
         let mut views = Views::new(Camera::Paper, &settings.clean, 0);
         let canonicaliser = Canonicaliser::new(
             Arc::clone(body),
@@ -51,22 +53,22 @@ impl Judge {
         )?
         .with_camera(views.camera());
         let subject = canonicaliser.subject();
-        let places = evenly_placed(sequence.frames.len(), 2 * FRAMES);
-        let learned = places.iter().step_by(2).enumerate();
-        let samples = learned
-            .map(|(number, &frame)| {
+        let (seen, judged) = seen_and_judged(sequences);
+        let samples = seen
+            .iter()
+            .enumerate()
+            .map(|(number, &(sequence, frame))| {
                 let yaw_rad = (number + 1) as f32 * std::f32::consts::FRAC_PI_4;
                 let view = views.keyframe(&Lesson { sequence, frame, yaw_rad })?;
                 let (samples, _) = canonicaliser.process(&view).context("poses are known")?;
                 Ok(samples)
             })
             .collect::<anyhow::Result<Vec<CanonicalSamples>>>()?;
-        let judged: Vec<usize> = places.iter().skip(1).step_by(2).copied().collect();
         let surfaces: Vec<PersonFrame> = judged
             .iter()
-            .map(|&frame| as_is(&frame_of(sequence, frame, &canonicaliser), subject))
+            .map(|&(sequence, frame)| as_is(&frame_of(sequence, frame, &canonicaliser), subject))
             .collect();
-        let first = judged
+        let &(first_sequence, first) = judged
             .first()
             .with_context(|| format!("{}: it has one frame only", sequence.plan.name))?;
         Ok(Self {
@@ -76,8 +78,32 @@ impl Judge {
                 judged: surfaces,
                 metres_per_unit: subject.unit_box.metres_per_unit(),
             },
-            truth_in_star: sequence.star_mesh(*first),
+            truth_in_star: first_sequence.star_mesh(first),
             canonicaliser,
         })
     }
+}
+
+/// Frames of sequences, by their numbers.
+type Frames<'a> = Vec<(&'a Sequence, usize)>;
+
+/// Half of the actions teach and the others judge; of a single one every other frame.
+fn seen_and_judged(sequences: &[Sequence]) -> (Frames<'_>, Frames<'_>) {
+    let (taught, others) = sequences.split_at(sequences.len() / 2);
+    if taught.is_empty() {
+        let both = spread(others, 2 * FRAMES);
+        let every_other = |first: usize| both.iter().skip(first).step_by(2).copied().collect();
+        return (every_other(0), every_other(1));
+    }
+    (spread(taught, FRAMES), spread(others, FRAMES))
+}
+
+/// So many of their frames, evenly.
+fn spread(sequences: &[Sequence], count: usize) -> Frames<'_> {
+    let all: Vec<_> = sequences
+        .iter()
+        .flat_map(|sequence| (0..sequence.frames.len()).map(move |frame| (sequence, frame)))
+        .collect();
+    let places = evenly_placed(all.len(), count);
+    places.into_iter().map(|place| all[place]).collect()
 }

@@ -20,7 +20,7 @@ use effigy_sim_sensor::dataset::{Dataset, Split};
 
 use self::{
     held_out::{Judge, is_held_out},
-    people::{ClothPeople, OffsetPeople, People},
+    people::{ClothPeople, OffsetPeople, People, by_person},
     report::Reporter,
 };
 use crate::{
@@ -175,15 +175,15 @@ fn people(args: &TrainShared, body: &Arc<BodyModel>) -> anyhow::Result<(People, 
     let dataset = Dataset::open(path, body)?;
     let settings = Settings::default();
     let all = dataset.manifest().sequences.iter();
+    let training = by_person(all.filter(|entry| entry.plan.split == Split::Train));
     let (mut teachers, mut judges) = (Vec::new(), Vec::new());
-    for (index, entry) in all
-        .filter(|entry| entry.plan.split == Split::Train)
-        .enumerate()
-    {
+    for (index, entries) in training.into_iter().enumerate() {
         if is_held_out(index) {
-            judges.push(Judge::new(&dataset.load(entry)?, body, &settings)?);
+            let sequences = entries.into_iter().map(|entry| dataset.load(entry));
+            let sequences = sequences.collect::<Result<Vec<_>, _>>()?;
+            judges.push(Judge::new(&sequences, body, &settings)?);
         } else {
-            teachers.push(entry);
+            teachers.push(entries);
         }
     }
     if teachers.is_empty() {

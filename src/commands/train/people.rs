@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use anyhow::Context as _;
 use effigy_avatar::{
     Canonicaliser, Subject,
     canonicalise::CanonicaliseConfig,
@@ -43,15 +44,16 @@ pub(super) struct ClothPeople {
 }
 
 impl ClothPeople {
+    /// `people`: everything that each of them does.
     pub(super) fn load(
         dataset: &Dataset,
-        entries: &[&SequenceEntry],
+        people: &[Vec<&SequenceEntry>],
         body: &Arc<BodyModel>,
         canonicalise: &CanonicaliseConfig,
     ) -> anyhow::Result<Self> {
-        let people = entries
+        let people = people
             .par_iter()
-            .map(|entry| learned(&dataset.load(entry)?, body, canonicalise))
+            .map(|entries| learned(dataset, entries, body, canonicalise))
             .collect::<anyhow::Result<_>>()?;
         Ok(Self { people })
     }
@@ -62,19 +64,38 @@ impl ClothPeople {
     }
 }
 
+/// The sequences of each person in an outfit, in the data set's order.
+pub(super) fn by_person<'a>(
+    entries: impl Iterator<Item = &'a SequenceEntry>,
+) -> Vec<Vec<&'a SequenceEntry>> {
+    let mut people: Vec<Vec<&SequenceEntry>> = Vec::new();
+    for entry in entries {
+        let who = |entry: &SequenceEntry| (entry.plan.subject, entry.plan.outfit);
+        match people.iter_mut().find(|known| who(known[0]) == who(entry)) {
+            Some(known) => known.push(entry),
+            None => people.push(vec![entry]),
+        }
+    }
+    people
+}
+
 fn learned(
-    sequence: &Sequence,
+    dataset: &Dataset,
+    entries: &[&SequenceEntry],
     body: &Arc<BodyModel>,
     config: &CanonicaliseConfig,
 ) -> anyhow::Result<Learned> {
-    let canonicaliser = Canonicaliser::new(Arc::clone(body), &sequence.betas, config.clone())?;
-    let frames = 0..sequence.frames.len();
-    Ok(Learned {
-        frames: frames
-            .map(|frame| frame_of(sequence, frame, &canonicaliser))
-            .collect(),
-        subject: *canonicaliser.subject(),
-    })
+    let mut frames = Vec::new();
+    let mut subject = None;
+    for entry in entries {
+        let sequence = dataset.load(entry)?;
+        let canonicaliser = Canonicaliser::new(Arc::clone(body), &sequence.betas, config.clone())?;
+        let numbers = 0..sequence.frames.len();
+        frames.extend(numbers.map(|frame| frame_of(&sequence, frame, &canonicaliser)));
+        subject = Some(*canonicaliser.subject());
+    }
+    let subject = subject.context("a person without sequences")?;
+    Ok(Learned { subject, frames })
 }
 
 /// A frame's whole surface, brought to canonical space as keyframes are: what the pose does to that is part of what
@@ -125,16 +146,16 @@ impl PersonSource for ClothPeople {
         } else {
             0
         };
-        let stride = (all / frames.max(1)).max(1);
+        let taken = frames.min(all);
         let frame = |index: usize| {
-            let frame = &person.frames[(start + index * stride) % all];
+            let frame = &person.frames[(start + index * all / taken) % all];
             if is_mirrored {
                 mirrored(frame, &person.subject)
             } else {
                 as_is(frame, &person.subject)
             }
         };
-        Person { frames: (0..frames.min(all)).map(frame).collect() }
+        Person { frames: (0..taken).map(frame).collect() }
     }
 }
 

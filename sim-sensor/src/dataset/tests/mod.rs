@@ -132,7 +132,11 @@ fn the_protocol_sees_a_whole_person_from_every_side() {
 
 #[test]
 fn no_test_person_and_no_blazer_is_ever_learned_from() {
-    for preset in [DatasetPreset::Prior, DatasetPreset::CapeLike] {
+    for preset in [
+        DatasetPreset::Prior,
+        DatasetPreset::PriorActions,
+        DatasetPreset::CapeLike,
+    ] {
         let plan = DatasetPlan::new(preset, 1);
         let of = |split| -> Vec<&SequencePlan> {
             plan.sequences
@@ -169,6 +173,26 @@ fn no_test_person_and_no_blazer_is_ever_learned_from() {
             "files would overwrite each other"
         );
     }
+}
+
+#[test]
+fn a_prior_of_actions_sees_everybody_in_four_and_every_two_actions_in_somebody() {
+    let plan = DatasetPlan::new(DatasetPreset::PriorActions, 1);
+    let mut pairs = std::collections::BTreeSet::new();
+    let people = plan.sequences.chunk_by(|a, b| seed_of(a) == seed_of(b));
+    let mut count = 0;
+    for person in people {
+        count += 1;
+        let actions: Vec<&str> = person.iter().map(|plan| plan.action.as_str()).collect();
+        assert_eq!(actions.len(), 4);
+        assert!(person.iter().all(|plan| plan.outfit == person[0].outfit));
+        for (k, &first) in actions.iter().enumerate() {
+            for &second in &actions[..k] {
+                pairs.insert((first.min(second), first.max(second)));
+            }
+        }
+    }
+    assert_eq!((count, pairs.len()), (64, 12 * 11 / 2));
 }
 
 #[test]
@@ -284,7 +308,11 @@ fn a_skirt_knows_where_it_came_from_and_the_manifest_says_by_how_much() {
 #[test]
 fn settings_are_chosen_on_people_whom_neither_training_nor_tests_meet() {
     let dev = DatasetPlan::new(DatasetPreset::Dev, 1);
-    for preset in [DatasetPreset::Prior, DatasetPreset::CapeLike] {
+    for preset in [
+        DatasetPreset::Prior,
+        DatasetPreset::PriorActions,
+        DatasetPreset::CapeLike,
+    ] {
         for other in &DatasetPlan::new(preset, 1).sequences {
             let met = dev
                 .sequences

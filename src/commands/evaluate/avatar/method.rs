@@ -303,7 +303,11 @@ fn baseline(
 
 /// The live settings; with more frames more steps, each over as many frames as the live chain has keyframes.
 fn tuning(job: &Job, frames: usize, live: &FineTuneConfig) -> FineTuneConfig {
-    let mut tuning = FineTuneConfig { seed: job.seed, ..*live };
+    let live = match job.method {
+        Method::BareBody | Method::Static | Method::Effigy => *live,
+        _ => live.without_code(),
+    };
+    let mut tuning = FineTuneConfig { seed: job.seed, ..live };
     match (job.method, job.data) {
         (Method::Oracle, _) => {
             tuning.steps *= ORACLE_STEPS_FACTOR;

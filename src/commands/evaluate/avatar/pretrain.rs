@@ -78,7 +78,7 @@ fn teach(
         frames_per_step: FRAMES_PER_STEP,
         held_out_share: 0.0,
         rates: RateConfig::everything(),
-        ..*live
+        ..live.without_code()
     };
     if let Some(architecture) = architecture(method) {
         let config = FineTuneConfig {

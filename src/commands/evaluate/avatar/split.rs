@@ -21,6 +21,10 @@ fn learned_from(training: &str) -> Vec<SequencePlan> {
     };
     let presets = [
         ("data set Prior of seed ", DatasetPreset::Prior),
+        (
+            "data set PriorActions of seed ",
+            DatasetPreset::PriorActions,
+        ),
         ("data set CapeLike of seed ", DatasetPreset::CapeLike),
         ("data set Dev of seed ", DatasetPreset::Dev),
         ("data set Small of seed ", DatasetPreset::Small),
@@ -101,7 +105,9 @@ mod tests {
 
     #[test]
     fn people_and_extrapolated_actions_of_the_tests_and_the_blazer_are_unknown_to_a_prior() {
-        let (prior, tests) = (plans(DatasetPreset::Prior), plans(DatasetPreset::CapeLike));
+        let mut prior = plans(DatasetPreset::Prior);
+        prior.extend(plans(DatasetPreset::PriorActions));
+        let tests = plans(DatasetPreset::CapeLike);
         for test in tests.iter().filter(|plan| plan.split == Split::Test) {
             assert!(
                 prior.iter().all(|plan| !is_same_person(plan, test)),
@@ -127,11 +133,13 @@ mod tests {
 
     #[test]
     fn a_provenance_brings_back_the_people_learned_from() {
-        let learned = learned_from("effigy train hyper, --seed 4, data set Prior of seed 3");
-        assert_eq!(
-            learned.len(),
-            DatasetPlan::new(DatasetPreset::Prior, 3).sequences.len()
-        );
+        for (words, preset) in [
+            ("Prior of seed 3", DatasetPreset::Prior),
+            ("PriorActions of seed 3", DatasetPreset::PriorActions),
+        ] {
+            let learned = learned_from(&format!("effigy train hyper, --seed 4, data set {words}"));
+            assert_eq!(learned, DatasetPlan::new(preset, 3).sequences);
+        }
         assert!(learned_from("effigy train prior --seed 1").is_empty());
     }
 }
