@@ -304,7 +304,8 @@ fn baseline(
 /// The live settings; with more frames more steps, each over as many frames as the live chain has keyframes.
 fn tuning(job: &Job, frames: usize, live: &FineTuneConfig) -> FineTuneConfig {
     let live = match job.method {
-        Method::BareBody | Method::Static | Method::Effigy => *live,
+        Method::BareBody | Method::Effigy => *live,
+        // One surface for all poses is nearer without, too: who it is tells what poses do.
         _ => live.without_code(),
     };
     let mut tuning = FineTuneConfig { seed: job.seed, ..live };
