@@ -436,7 +436,11 @@ mod tests {
     use rand::{RngExt as _, SeedableRng as _, rngs::StdRng};
 
     use super::*;
-    use crate::{hyper::HeadKind, nn::linear::OuterGradient, sdf::SirenConfig};
+    use crate::{
+        hyper::HeadKind,
+        nn::linear::{OuterGradient, sum_of_rows},
+        sdf::SirenConfig,
+    };
 
     const SMALL: HyperConfig = HyperConfig {
         field: SirenConfig { hidden: 16, layers: 3 },
@@ -519,14 +523,7 @@ mod tests {
                 .for_each(|(gradient, layer)| linear(gradient, layer));
         }
         if !network.person.is_empty() {
-            let mut person = vec![0.0; network.person.len()];
-            for row in gradient.person.chunks_exact(person.len()) {
-                person
-                    .iter_mut()
-                    .zip(row)
-                    .for_each(|(sum, bar)| *sum += bar);
-            }
-            list.push(person);
+            list.push(sum_of_rows(&gradient.person, network.person.len()));
         }
         for (gradient, head) in gradient.heads.iter().zip(&network.heads) {
             let mut part = Vec::new();

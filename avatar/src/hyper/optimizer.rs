@@ -11,6 +11,7 @@ use crate::nn::{
     AdamConfig, AdamStep,
     adam::{LinearMoments, LinearRates, Moments},
     layer_norm::LayerNorm,
+    linear::sum_of_rows,
 };
 
 /// Mean hidden activation after `LayerNorm` and `ReLU` (seed-systems 1.3).
@@ -80,9 +81,7 @@ impl RateConfig {
             ..everything
         }
     }
-}
 
-impl RateConfig {
     /// Nothing but who it is.
     pub fn of_code() -> Self {
         Self {
@@ -293,16 +292,7 @@ impl HyperOptimizer {
         step: &AdamStep,
         share: f32,
     ) {
-        if network.person.is_empty() {
-            return;
-        }
-        let mut gradient = vec![0.0; network.person.len()];
-        for row in rows.chunks_exact(gradient.len()) {
-            gradient
-                .iter_mut()
-                .zip(row)
-                .for_each(|(sum, bar)| *sum += bar);
-        }
+        let gradient = sum_of_rows(rows, network.person.len());
         let rate = self.rates.person * share;
         self.person.step(step, rate, &gradient, &mut network.person);
     }

@@ -4,7 +4,7 @@ use effigy_fusion::simd;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::linear::{Linear, OuterGradient};
+use super::linear::{Linear, OuterGradient, sum_of_rows};
 
 /// Decay rates and epsilon; MetaAvatar keeps the defaults in every stage.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -152,12 +152,7 @@ impl LinearMoments {
                 let rows = Rows { first: index * ROWS_PER_PIECE, inputs, outputs, gradient };
                 step_rows(step, rates.weight, &rows, weight, (mean, square));
             });
-        let mut bias_gradient = vec![0.0; outputs];
-        for row in gradient.output_bar.chunks_exact(outputs) {
-            for (sum, bar) in bias_gradient.iter_mut().zip(row) {
-                *sum += bar;
-            }
-        }
+        let bias_gradient = sum_of_rows(&gradient.output_bar, outputs);
         self.bias
             .step(step, rates.bias, &bias_gradient, &mut layer.bias);
     }

@@ -77,6 +77,17 @@ impl Linear {
     }
 }
 
+/// The sum of a batch's rows of `width` numbers each; empty for a width of zero.
+pub(crate) fn sum_of_rows(rows: &[f32], width: usize) -> Vec<f32> {
+    let mut sums = vec![0.0; width];
+    for row in rows.chunks_exact(width.max(1)) {
+        for (sum, x) in sums.iter_mut().zip(row) {
+            *sum += x;
+        }
+    }
+    sums
+}
+
 /// What a layer's parameter gradient is made of: `dW = output_bar^T input`, `db = sum of output_bar`.
 /// Its rank is the batch's size, so it is never written out; Adam forms each entry when it needs it.
 #[derive(Clone, Debug, Default)]
