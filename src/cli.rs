@@ -331,6 +331,9 @@ pub(crate) struct DatasetMakeArgs {
     /// Who the people are
     #[arg(long, default_value_t = 1)]
     pub(crate) seed: u64,
+    /// Only sequences whose name contains one of these; the others can be made later, into the same folder
+    #[arg(long, value_delimiter = ',', value_name = "TEXT")]
+    pub(crate) only: Vec<String>,
     /// The folder to fill
     #[arg(long)]
     pub(crate) out: PathBuf,

@@ -18,7 +18,7 @@ use crate::{
     smpl::JOINT_COUNT,
     solve::{Damping, Termination, take_step},
     state::BodyState,
-    surface::{PosedSurface, ShapedSurface, Surface},
+    surface::{PosedSurface, REGION_COUNT, ShapedSurface, Surface},
 };
 
 /// How the terms weigh against each other. Each weight counts independent measurements: neighbouring pixels share
@@ -31,6 +31,8 @@ pub struct EnergyConfig {
     /// Where people wear clothes, depth is expected this far off the skin. A shape that only stays inside
     /// the clothes would grow into them: girth explains an even layer as well as cloth does.
     pub cloth_standoff_m: f32,
+    /// How many times that it is on the trunk, on upper arms, forearms, thighs and shins.
+    pub cloth_by_region: [f32; REGION_COUNT],
     /// Hair stands off the skull by this.
     pub hair_m: f32,
     /// Shoes lift bare feet off the floor by this.
@@ -81,6 +83,7 @@ impl Default for EnergyConfig {
         Self {
             data_weight: 400.0,
             cloth_standoff_m: 0.010,
+            cloth_by_region: [1.0; REGION_COUNT],
             hair_m: 0.008,
             sole_m: 0.012,
             cloth_outside_m: 0.020,
@@ -111,13 +114,24 @@ impl Default for EnergyConfig {
 }
 
 impl EnergyConfig {
-    /// For clothes that stand off by so much on average: as much more or less is to be expected of them.
-    pub(crate) fn with_clothes(&self, thickness_m: f32) -> Self {
-        let ratio = thickness_m / self.cloth_standoff_m.max(1e-4);
+    /// For clothes that stand off by so much on average in each region.
+    pub(crate) fn with_clothes(&self, thickness_m: &[f32; REGION_COUNT]) -> Self {
+        let standoff_m = self.cloth_standoff_m.max(1e-4);
         Self {
-            cloth_standoff_m: thickness_m,
-            cloth_outside_m: (self.cloth_outside_m * ratio).clamp(0.010, 0.040),
+            cloth_by_region: thickness_m.map(|thickness_m| thickness_m / standoff_m),
             ..*self
+        }
+    }
+
+    /// How far outside of the expected clothes a point costs one: the thicker they are, the less is known of them.
+    fn cloth_outside_m(&self, times: f32) -> f32 {
+        /// Cloth of any kind has folds, and none is known worse.
+        const KNOWN_TO_M: [f32; 2] = [0.010, 0.040];
+        let [best, worst] = KNOWN_TO_M;
+        if times == 1.0 {
+            self.cloth_outside_m
+        } else {
+            (self.cloth_outside_m * times).clamp(best, worst)
         }
     }
 }
@@ -301,12 +315,14 @@ impl Evidence {
         let widen = self.widen.max(1.0);
         let data = PointToPlane {
             matches: &self.matches,
-            cloth: ClothSide {
-                outside: energy.cloth_outside_m,
+            cloth: energy.cloth_by_region.map(|times| ClothSide {
+                outside: energy.cloth_outside_m(times),
                 inside: energy.cloth_inside_m,
                 outlier: energy.outlier_m * widen,
-            },
-            standoff_m: energy.cloth_standoff_m,
+            }),
+            standoff_m: energy
+                .cloth_by_region
+                .map(|times| energy.cloth_standoff_m * times),
             hair_m: energy.hair_m,
             say_in_hollows: energy.say_in_hollows,
             weight: energy.data_weight / self.point_count.max(1) as f32,

@@ -1,7 +1,9 @@
 //! Shape from several frames: one set of betas and a pose a frame, fitted together, inside the clothes.
 
-use serde::{Deserialize, Serialize};
 use std::sync::Arc;
+
+use glam::Vec3;
+use serde::{Deserialize, Serialize};
 
 use crate::{
     align::{Context, EnergyConfig, Evidence, thinned},
@@ -10,7 +12,7 @@ use crate::{
     residual::{ShapePrior, Term as _},
     solve::{Eliminated, NormalEquations, shorten},
     state::{ALL_UNKNOWNS, BETA_COUNT, BodyState, POSE_UNKNOWNS},
-    surface::{PosedSurface, ShapedSurface, Surface},
+    surface::{PosedSurface, REGION_COUNT, ShapedSurface, Surface},
     thickness::Scatter,
 };
 
@@ -81,8 +83,8 @@ struct Estimate {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Learned {
     pub(crate) betas: [f32; BETA_COUNT],
-    /// How far their clothes stand off on average, where that can be told.
-    pub(crate) thickness_m: Option<f32>,
+    /// How far their clothes stand off in each region on average, where that can be told.
+    pub(crate) thickness_m: Option<[f32; REGION_COUNT]>,
 }
 
 /// What [`ShapeFit::advance`] needs to know of the frame it is called in.
@@ -155,7 +157,7 @@ impl ShapeFit {
     }
 
     /// Follows the world when it moves.
-    pub(crate) fn move_by(&mut self, new_from_old: effigy_capture::Rigid3, pelvis: glam::Vec3) {
+    pub(crate) fn move_by(&mut self, new_from_old: effigy_capture::Rigid3, pelvis: Vec3) {
         for view in &mut self.views {
             view.observation.move_by(new_from_old);
             view.state = view.state.seen_from(new_from_old, pelvis);

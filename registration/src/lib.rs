@@ -31,4 +31,4 @@ pub use initialize::InitializeConfig;
 pub use registered::{RegisteredFrame, Tracking};
 pub use smooth::{SmoothConfig, Smoother};
 pub use smpl::{BodyModel, BodyParams, PosedBody};
-pub use track::{TrackConfig, Tracker};
+pub use track::{Refiner, TrackConfig, Tracker};

@@ -37,7 +37,6 @@ impl BodyState {
         moved
     }
 
-    #[cfg(test)]
     pub(crate) fn from_params(params: &BodyParams) -> Self {
         Self {
             betas: params.betas,

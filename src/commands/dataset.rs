@@ -2,7 +2,7 @@
 
 use std::{collections::BTreeMap, f32::consts::PI, path::Path, sync::Arc};
 
-use anyhow::bail;
+use anyhow::{bail, ensure};
 use effigy_fusion::TriangleMesh;
 use effigy_registration::{BodyModel, smpl::builtin};
 use effigy_sim_sensor::dataset::{
@@ -43,7 +43,16 @@ fn make_dataset(args: &DatasetMakeArgs) -> anyhow::Result<()> {
             "CAPE itself is not made but imported: `effigy dataset import-cape`; `cape-like` is ours"
         );
     }
-    let plan = DatasetPlan::new(args.preset, args.seed);
+    let mut plan = DatasetPlan::new(args.preset, args.seed);
+    if !args.only.is_empty() {
+        let wanted = |name: &str| args.only.iter().any(|part| name.contains(part));
+        plan.sequences.retain(|sequence| wanted(&sequence.name));
+        ensure!(
+            !plan.sequences.is_empty(),
+            "--only {}: no sequence of this data set is called anything like it; names look like test-003-blazer-trousers-bend",
+            args.only.join(",")
+        );
+    }
     let progress = Progress::new("simulating", Some(plan.frame_count()));
     let go_on = |now: MakeProgress| {
         progress.advance(now.frames);

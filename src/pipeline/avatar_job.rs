@@ -26,7 +26,11 @@ use effigy_registration::{
     motion::{Motion, RestBody, Routine},
 };
 
-use super::{clock::Clock, settings::Settings};
+use super::{
+    clock::Clock,
+    refine::{OnStep, Refinement},
+    settings::Settings,
+};
 use crate::{interrupt, machine::Machine};
 
 /// How often somebody who waits for an avatar looks up.
@@ -259,11 +263,6 @@ impl Work {
             self.settings.canonicalise.clone(),
         )?
         .with_camera(&self.camera);
-        let samples: Vec<CanonicalSamples> = self
-            .keyframes
-            .iter()
-            .filter_map(|keyframe| Some(canonicaliser.process(&keyframe.frame)?.0))
-            .collect();
         let prior = self.settings.prior_network(self.body.identity)?;
         let tuning_started = self.clock.secs();
         let subject = canonicaliser.subject();
@@ -271,11 +270,24 @@ impl Work {
         // Fine-tuning refuses to start without samples.
         let driver_of = |network: HyperNetwork, map: &MapConfig| {
             let skinning = &**canonicaliser.skinning();
-            let theta = &samples[samples.len() / 2].theta;
+            let theta = self.keyframes[self.keyframes.len() / 2].params.theta;
             let topology = TopologyConfig::default();
-            let avatar = Avatar::new(subject, Arc::new(network), skinning, theta, &topology)?;
+            let avatar = Avatar::new(subject, Arc::new(network), skinning, &theta, &topology)?;
             self.driver_of(Arc::new(avatar), &motions, map)
         };
+        let before = self.settings.refine.steps_in_all();
+        let steps = before + self.settings.fine_tune.steps;
+        let mut on_step = |now: &FineTuneProgress, network: &HyperNetwork| {
+            let step = now.step;
+            if step == self.settings.preview.steps && step < steps {
+                let made = driver_of(network.clone(), &self.map_of_preview());
+                self.show(made, started);
+            }
+            let elapsed_secs = self.clock.secs() - tuning_started;
+            let left_secs = elapsed_secs * f64::from(steps - step) / f64::from(step.max(1));
+            self.report(&FineTuneProgress { steps, elapsed_secs, left_secs, ..*now })
+        };
+        let samples = self.samples(&canonicaliser, &prior, &mut on_step)?;
         let mut last = FineTuneProgress::default();
         let network = fine_tune(
             prior,
@@ -285,11 +297,10 @@ impl Work {
             &|| self.clock.secs(),
             &mut |now, network| {
                 last = *now;
-                if now.step == self.settings.preview.steps && now.step < now.steps {
-                    let made = driver_of(network.clone(), &self.map_of_preview());
-                    self.show(made, started);
-                }
-                self.report(now)
+                on_step(
+                    &FineTuneProgress { step: before + now.step, ..*now },
+                    network,
+                )
             },
         )?;
         let fine_tune_secs = self.clock.secs() - tuning_started;
@@ -303,6 +314,27 @@ impl Work {
             total_secs: self.clock.secs() - started,
         };
         Ok(FinishedAvatar { driver, figures })
+    }
+
+    /// What is learned from: the keyframes, looked at again with the clothes that they show, in canonical space.
+    fn samples(
+        &self,
+        canonicaliser: &Canonicaliser,
+        prior: &HyperNetwork,
+        on_step: &mut OnStep<'_>,
+    ) -> anyhow::Result<Vec<CanonicalSamples>> {
+        let tracked: Vec<_> = self
+            .keyframes
+            .iter()
+            .map(|keyframe| keyframe.frame.clone())
+            .collect();
+        let Self { body, camera, settings, .. } = self;
+        let refined = Refinement { body, camera, canonicaliser, prior, settings }
+            .refined(&tracked, on_step)?;
+        let samples = refined
+            .iter()
+            .filter_map(|keyframe| Some(canonicaliser.process(keyframe)?.0));
+        Ok(samples.collect())
     }
 
     /// What drives an avatar, and how far its map is from the field if it has one: only what is near enough drives

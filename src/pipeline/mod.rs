@@ -12,6 +12,7 @@ pub(crate) mod poses;
 pub(crate) mod publish;
 pub(crate) mod real_time;
 pub(crate) mod recorder;
+pub(crate) mod refine;
 pub(crate) mod run_log;
 pub(crate) mod schedule;
 pub(crate) mod settings;

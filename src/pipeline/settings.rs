@@ -17,6 +17,7 @@ use effigy_fusion::clean::CleanConfig;
 use effigy_registration::{SmoothConfig, smpl::BodyIdentity, track::TrackConfig};
 use serde::{Deserialize, Serialize};
 
+use super::refine::RefineConfig;
 use crate::files;
 
 /// More would not be few shots any more, and fill the memory.
@@ -37,6 +38,8 @@ pub(crate) struct Settings {
     pub(crate) smooth: Option<SmoothConfig>,
     pub(crate) keyframes: KeyframeConfig,
     pub(crate) canonicalise: CanonicaliseConfig,
+    /// Whether keyframes are looked at again with the clothes that they turned out to show.
+    pub(crate) refine: RefineConfig,
     pub(crate) fine_tune: FineTuneConfig,
     /// How an avatar's shape is learned as a function of the pose, so that the drive need not evaluate its field.
     pub(crate) map: MapConfig,

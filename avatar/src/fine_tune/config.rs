@@ -16,6 +16,9 @@ pub struct FineTuneConfig {
     /// found there comes with what poses do to such clothes.
     pub code_steps: u32,
     pub code_rates: RateConfig,
+    /// From then on a point this far from the surface of whoever was found counts half, a farther one less, metres: no
+    /// clothes are there, the keyframe's pose is wrong. 0 for no doubts.
+    pub doubt_m: f32,
     /// Keyframes that a step learns from, drawn anew each time; 0 for all of them. With a few it is all: only where
     /// hundreds are learned from would each step take too long.
     pub frames_per_step: usize,
@@ -42,6 +45,7 @@ impl Default for FineTuneConfig {
             steps: 150,
             code_steps: 75,
             code_rates: RateConfig::of_code(),
+            doubt_m: 0.02,
             frames_per_step: 0,
             warm_up_steps: 10,
             decay_share: 0.5,

@@ -146,10 +146,28 @@ impl FineTuner {
         let optimizer = self.code_optimizer.as_mut().unwrap_or(&mut self.optimizer);
         optimizer.step(&mut self.network, &gradient, share);
         self.step += 1;
-        if self.step >= self.config.code_steps {
+        if self.step == self.config.code_steps {
             self.code_optimizer = None;
+            self.doubt();
         }
         Ok(terms)
+    }
+
+    /// Takes weight from points that are far from the surface of whoever was found.
+    fn doubt(&mut self) {
+        let half = self.config.doubt_m / self.metres_per_unit;
+        if half <= 0.0 {
+            return;
+        }
+        let (_, parameters) = self.network.forward(&self.poses);
+        for (keyframe, parameters) in self.keyframes.iter_mut().zip(parameters) {
+            let points: Vec<Vec3> = keyframe.surface.iter().map(|at| at.point).collect();
+            let mut values = vec![0.0; points.len()];
+            SirenField::new(self.network.config().field, parameters).values(&points, &mut values);
+            for (at, value) in keyframe.surface.iter_mut().zip(values) {
+                at.weight /= 1.0 + (value / half).powi(2);
+            }
+        }
     }
 
     /// Mean distance to the surface of points that no step has seen, weighted as the loss weighs them.

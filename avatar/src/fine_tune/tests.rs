@@ -183,6 +183,36 @@ fn the_first_steps_look_for_who_it_is_and_leave_all_else() {
 }
 
 #[test]
+fn points_far_from_whoever_was_found_count_less() {
+    // A third of the points are where a keyframe with another arm would have them.
+    let mut spoiled = keyframes();
+    for samples in &mut spoiled {
+        for (point, normal) in samples
+            .points_in_unit
+            .iter_mut()
+            .zip(&samples.normals)
+            .step_by(3)
+        {
+            *point += *normal * 0.3;
+        }
+    }
+    let start = learned(&FineTuneConfig { steps: 300, ..config() });
+    let off = |doubt_m| {
+        let config = FineTuneConfig { steps: 100, code_steps: 1, doubt_m, ..config() };
+        let mut ignore = |_: &_, _: &_| ControlFlow::Continue(());
+        let network =
+            fine_tune(start.clone(), &spoiled, 1.0, &config, &|| 0.0, &mut ignore).unwrap();
+        let points: Vec<Vec3> = keyframes()[1].points_in_unit.clone();
+        let mut values = vec![0.0; points.len()];
+        network.field(&pose(0.5)).values(&points, &mut values);
+        values.iter().map(|value| value.abs()).sum::<f32>() / values.len() as f32
+    };
+    let (doubted, believed) = (off(0.02), off(0.0));
+    println!("{doubted} with doubts, {believed} without");
+    assert!(doubted < 0.85 * believed, "{doubted} {believed}");
+}
+
+#[test]
 fn points_of_weight_zero_are_never_drawn() {
     let mut spoiled = keyframes();
     for samples in &mut spoiled {

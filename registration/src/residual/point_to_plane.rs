@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use super::{ClothSide, Row, RowSink, Term};
-use crate::surface::PosedSurface;
+use crate::surface::{PosedSurface, REGION_COUNT};
 
 /// A depth point and the vertex it is believed to lie on; world space.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -22,9 +22,10 @@ pub(crate) struct Match {
 #[derive(Clone, Debug)]
 pub(crate) struct PointToPlane<'a> {
     pub(crate) matches: &'a [Match],
-    pub(crate) cloth: ClothSide,
-    /// How far clothes stand off the skin on average, where there are any.
-    pub(crate) standoff_m: f32,
+    /// In each region of the body.
+    pub(crate) cloth: [ClothSide; REGION_COUNT],
+    /// How far clothes stand off the skin there on average, where there are any.
+    pub(crate) standoff_m: [f32; REGION_COUNT],
     /// The same of hair.
     pub(crate) hair_m: f32,
     /// Where clothes span a hollow, what is outside of the body says this little about it.
@@ -39,10 +40,11 @@ impl Term for PointToPlane<'_> {
         for found in self.matches {
             let vertex = found.vertex as usize;
             let surface = &body.shaped.surface;
-            let standoff_m =
-                self.standoff_m * surface.clothed[vertex] + self.hair_m * surface.hairy[vertex];
+            let region = usize::from(surface.region[vertex]);
+            let standoff_m = self.standoff_m[region] * surface.clothed[vertex]
+                + self.hair_m * surface.hairy[vertex];
             let distance_m = found.normal.dot(found.point - body.vertices[vertex]) - standoff_m;
-            let (weight, cost) = self.cloth.weight_and_cost(distance_m, found.sigma_m);
+            let (weight, cost) = self.cloth[region].weight_and_cost(distance_m, found.sigma_m);
             let spanned = distance_m > 0.0 && surface.spanned[vertex];
             let say = if spanned { self.say_in_hollows } else { 1.0 };
             let scale = self.weight * found.trust * say;
@@ -77,8 +79,8 @@ mod tests {
         let cloth = ClothSide { outside: 0.02, inside: 0.008, outlier: 0.06 };
         checker::assert_derivatives(&PointToPlane {
             matches: &matches,
-            cloth,
-            standoff_m: 0.01,
+            cloth: [cloth; REGION_COUNT],
+            standoff_m: [0.01; REGION_COUNT],
             hair_m: 0.008,
             say_in_hollows: 0.05,
             weight: 1.0,
@@ -107,8 +109,8 @@ mod tests {
             let cloth = ClothSide { outside: 0.02, inside: 0.02, outlier: 10.0 };
             let term = PointToPlane {
                 matches: &[found],
-                cloth,
-                standoff_m: 0.0,
+                cloth: [cloth; REGION_COUNT],
+                standoff_m: [0.0; REGION_COUNT],
                 hair_m: 0.0,
                 say_in_hollows: 0.05,
                 weight: 1.0,

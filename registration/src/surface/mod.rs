@@ -32,6 +32,8 @@ pub(crate) struct Surface {
     pub(crate) pose_dirs: Vec<PoseDirection>,
     /// For each vertex the share of it that clothes cover on most people: all but head, hands and feet.
     pub(crate) clothed: Vec<f32>,
+    /// For each vertex its number among [`REGION_COUNT`]: clothes are not equally thick everywhere.
+    pub(crate) region: Vec<u8>,
     /// For each vertex 1 where most people have hair, else 0.
     pub(crate) hairy: Vec<f32>,
     /// For each vertex whether clothes span a hollow there instead of following the skin.
@@ -49,6 +51,19 @@ fn clothed_share(weights: &VertexWeights) -> f32 {
         .filter(|(bone, _)| !BARE_BONES.contains(bone))
         .map(|(_, weight)| weight)
         .sum()
+}
+
+/// Trunk, upper arms, forearms, thighs, shins.
+pub(crate) const REGION_COUNT: usize = 5;
+
+fn region(weights: &VertexWeights) -> u8 {
+    match weights.main_bone() {
+        16 | 17 => 1,
+        18..=23 => 2,
+        1 | 2 => 3,
+        4 | 5 | 7 | 8 | 10 | 11 => 4,
+        _ => 0,
+    }
 }
 
 /// 1 on the crown and the back of the head, else 0.
@@ -117,6 +132,7 @@ impl Surface {
             .map(|&v| model.skinning[v as usize])
             .collect();
         let clothed = skinning.iter().map(clothed_share).collect();
+        let region = skinning.iter().map(region).collect();
         let hairy = hairy(&model, &coarse.vertices, &skinning);
         let influences = skinning.iter().map(Influences::new).collect();
         let pose_dirs = restrict(&model.pose_dirs, &coarse.vertices, model.vertex_count());
@@ -125,6 +141,7 @@ impl Surface {
         Self {
             vertices: coarse.vertices,
             clothed,
+            region,
             hairy,
             spanned,
             legs,

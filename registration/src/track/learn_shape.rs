@@ -34,7 +34,7 @@ impl Tracker {
             return;
         };
         if let (Some(thickness_m), true) = (thickness_m, config.fit.learns_thickness) {
-            self.clothes = config.energy.with_clothes(thickness_m);
+            self.clothes = config.energy.with_clothes(&thickness_m);
             if self.worn.is_none() {
                 self.energy = self.clothes;
             }

@@ -6,9 +6,11 @@ mod find;
 mod follow;
 mod learn_shape;
 mod phase;
+mod refine;
 mod worn;
 
 pub use config::TrackConfig;
+pub use refine::Refiner;
 
 use std::sync::Arc;
 

@@ -10,7 +10,7 @@ use crate::{
     error::RegistrationError,
     smpl::{BodyModel, star_transforms},
     state::BETA_COUNT,
-    surface::{ShapedSurface, Surface},
+    surface::{REGION_COUNT, ShapedSurface, Surface},
 };
 
 /// A surface known to this is met from both sides alike.
@@ -23,15 +23,7 @@ impl Tracker {
         let model = &self.surface.model;
         let offsets = offsets_in_zero_pose(model, &self.shaped.betas, offsets_in_canonical)?;
         self.worn = Some(Arc::from(offsets));
-        self.energy = EnergyConfig {
-            cloth_standoff_m: 0.0,
-            hair_m: 0.0,
-            sole_m: 0.0,
-            cloth_outside_m: KNOWN_TO_M,
-            cloth_inside_m: KNOWN_TO_M,
-            say_in_hollows: 1.0,
-            ..self.config.energy
-        };
+        self.energy = self.config.energy.with_known_surface();
         self.shaped = self.dressed(&self.surface, self.shaped.betas);
         Ok(())
     }
@@ -53,8 +45,24 @@ impl Tracker {
     }
 }
 
+impl EnergyConfig {
+    /// For a surface that is met as it is, without clothes over it.
+    pub(super) fn with_known_surface(self) -> Self {
+        Self {
+            cloth_standoff_m: 0.0,
+            cloth_by_region: [1.0; REGION_COUNT],
+            hair_m: 0.0,
+            sole_m: 0.0,
+            cloth_outside_m: KNOWN_TO_M,
+            cloth_inside_m: KNOWN_TO_M,
+            say_in_hollows: 1.0,
+            ..self
+        }
+    }
+}
+
 /// Offsets turn back with the bones that carry them.
-fn offsets_in_zero_pose(
+pub(super) fn offsets_in_zero_pose(
     model: &BodyModel,
     betas: &[f32; BETA_COUNT],
     offsets_in_canonical: &[Vec3],

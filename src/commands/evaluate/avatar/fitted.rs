@@ -29,11 +29,16 @@ pub(super) struct Tracked {
     pub(super) pelvis_off_m: Vec3,
 }
 
+/// Looks at keyframes again, given the person's shape.
+pub(super) type Refine<'a> =
+    dyn Fn(&[RegisteredFrame], &[f32; 10]) -> anyhow::Result<Vec<RegisteredFrame>> + 'a;
+
 pub(super) fn track(
     lessons: &[Lesson<'_>],
     views: &mut Views,
     body: &Arc<BodyModel>,
     config: &TrackConfig,
+    refine: &Refine<'_>,
 ) -> anyhow::Result<Tracked> {
     let run_ups = lessons
         .iter()
@@ -45,19 +50,31 @@ pub(super) fn track(
     for (frames, _) in &run_ups {
         follower.follow(frames, views, 0)?;
     }
-    let mut keyframes = Vec::with_capacity(lessons.len());
-    let mut pelvis_off_m = Vec3::ZERO;
+    let (mut keyframes, mut before, mut truths) = (Vec::new(), Vec::new(), Vec::new());
     for ((frames, world_from_camera), lesson) in run_ups.iter().zip(lessons) {
         let mut followed = follower.follow(frames, views, SNIPPET + 1)?;
         if let Some(keyframe) = followed.pop().filter(|frame| frame.params().is_some()) {
-            let truth = (lesson.sequence.params(lesson.frame), *world_from_camera);
-            pelvis_off_m += pelvis_off(body, &keyframe, &truth);
+            truths.push((lesson.sequence.params(lesson.frame), *world_from_camera));
             followed.retain(|frame| frame.params().is_some());
-            keyframes.push((keyframe, followed));
+            keyframes.push(keyframe);
+            before.push(followed);
         }
     }
-    pelvis_off_m /= keyframes.len().max(1) as f32;
-    Ok(Tracked { betas: follower.tracker.betas(), keyframes, pelvis_off_m })
+    let betas = follower.tracker.betas();
+    tracing::debug!(
+        mm = joints_off_mm(body, &keyframes, &truths),
+        "joints, as tracked"
+    );
+    let keyframes = refine(&keyframes, &betas)?;
+    tracing::debug!(
+        mm = joints_off_mm(body, &keyframes, &truths),
+        "joints, refined"
+    );
+    let off = keyframes.iter().zip(&truths);
+    let off = off.map(|(keyframe, truth)| pelvis_off(body, keyframe, truth));
+    let pelvis_off_m = off.sum::<Vec3>() / keyframes.len().max(1) as f32;
+    let keyframes = keyframes.into_iter().zip(before).collect();
+    Ok(Tracked { betas, keyframes, pelvis_off_m })
 }
 
 /// From the true pelvis to the tracked one, in the true one's axes; both worlds are compared in the camera.
@@ -75,6 +92,32 @@ fn pelvis_off(
     let real = world_from_camera.inverse() * pelvis(truth);
     let off_in_world = world_from_camera.rotation * (found - real);
     Quat::from_scaled_axis(truth.theta[0]).inverse() * off_in_world
+}
+
+/// Mean distance of the keyframes' joints to the true ones, compared in the camera.
+fn joints_off_mm(
+    body: &BodyModel,
+    keyframes: &[RegisteredFrame],
+    truths: &[(BodyParams, Rigid3)],
+) -> f32 {
+    let (mut sum, mut count) = (0.0, 0);
+    for (keyframe, (truth, world_from_camera)) in keyframes.iter().zip(truths) {
+        let Some(params) = keyframe.params() else {
+            continue;
+        };
+        let joints = |params: &BodyParams, world_from_camera: &Rigid3| {
+            let camera_from_world = world_from_camera.inverse();
+            body.pose(params)
+                .joints
+                .map(|joint| camera_from_world * joint)
+        };
+        let found = joints(params, &keyframe.world_from_camera);
+        for (found, real) in found.iter().zip(joints(truth, world_from_camera)) {
+            sum += found.distance(real) * 1e3;
+            count += 1;
+        }
+    }
+    sum / count.max(1) as f32
 }
 
 /// The frames that lead to a keyframe, and itself; and where the camera stands then in the data set's world.

@@ -13,7 +13,7 @@ use effigy_avatar::{
     mesher,
 };
 use effigy_fusion::{TriangleMesh, mesh::sample::sample_surface};
-use effigy_registration::{BodyModel, BodyParams};
+use effigy_registration::{BodyModel, BodyParams, RegisteredFrame};
 use glam::{Quat, Vec3};
 
 use super::{
@@ -25,7 +25,7 @@ use super::{
 };
 use crate::{
     interrupt,
-    pipeline::{clock::Clock, evaluate::RESOLUTION, settings::Settings},
+    pipeline::{clock::Clock, evaluate::RESOLUTION, refine::Refinement, settings::Settings},
 };
 
 /// Points of a true surface that the oracle learns from.
@@ -160,7 +160,19 @@ fn see(job: &Job, given: &Given<'_>) -> anyhow::Result<(Seen, f64)> {
     let mut views = Views::new(job.camera, &settings.clean, job.seed);
     let tracked = match job.poses {
         Poses::True => None,
-        Poses::Fitted => Some(track(&lessons, &mut views, body, &settings.track)?),
+        Poses::Fitted => {
+            let camera = *views.camera();
+            let refine = |keyframes: &[RegisteredFrame], betas: &[f32; 10]| {
+                let config = settings.canonicalise.clone();
+                let canonicaliser =
+                    Canonicaliser::new(Arc::clone(body), betas, config)?.with_camera(&camera);
+                let prior = settings.prior_network(body.identity)?;
+                let (prior, canonicaliser, camera) = (&prior, &canonicaliser, &camera);
+                Refinement { body, camera, canonicaliser, prior, settings }
+                    .refined(keyframes, &mut |_, _| go_on())
+            };
+            Some(track(&lessons, &mut views, body, &settings.track, &refine)?)
+        }
     };
     let betas = tracked
         .as_ref()

@@ -1,0 +1,86 @@
+//! A second look at frames that were tracked, once it is known what the person wears.
+
+use std::sync::Arc;
+
+use effigy_capture::CameraModel;
+use glam::Vec3;
+
+use super::{TrackConfig, tracked, worn::offsets_in_zero_pose};
+use crate::{
+    align::{Context, Effort, align},
+    error::RegistrationError,
+    observe::{Observation, ObserveConfig},
+    registered::RegisteredFrame,
+    residual::Prediction,
+    smpl::{BodyModel, BodyParams, JOINT_COUNT},
+    state::BodyState,
+    surface::{ShapedSurface, Surface},
+};
+
+/// Brings bodies that were tracked without knowing their clothes onto the surface that they turned out to have.
+#[derive(Debug)]
+pub struct Refiner {
+    surface: Arc<Surface>,
+    camera: CameraModel,
+    config: TrackConfig,
+}
+
+impl Refiner {
+    pub fn new(model: Arc<BodyModel>, camera: CameraModel, config: TrackConfig) -> Self {
+        let surface = Arc::new(Surface::new(model, config.surface_vertices));
+        Self { surface, camera, config }
+    }
+
+    /// The same frame with its pose aligned to a surface: for each of the model's vertices how far that is from it, in
+    /// canonical (star-pose) space and in this frame's pose. Nothing moves far from the pose `near` (of the same betas),
+    /// which may be the frame's own or where it was tracked at first: limbs that the frame does not show stay there. A
+    /// frame that is not tracked, or in which nobody is seen, comes back as it is.
+    pub fn refine(
+        &self,
+        frame: &RegisteredFrame,
+        near: &BodyParams,
+        offsets_in_canonical: &[Vec3],
+    ) -> Result<RegisteredFrame, RegistrationError> {
+        let (Some(params), Some(observation)) = (frame.params(), self.observe(frame)) else {
+            return Ok(frame.clone());
+        };
+        let model = &self.surface.model;
+        let offsets = offsets_in_zero_pose(model, &params.betas, offsets_in_canonical)?;
+        let shaped = ShapedSurface::wearing(&self.surface, params.betas, Some(&offsets));
+        let near = Prediction {
+            state: BodyState::from_params(near),
+            joints_still: [0.0; JOINT_COUNT],
+            trans_still: 0.0,
+        };
+        let energy = self.config.energy.with_known_surface();
+        let context = Context {
+            energy: &energy,
+            predicted: Some(&near),
+            grounded: frame.clean.floor.is_some(),
+            whole: true,
+        };
+        let effort = Effort {
+            rounds: 2 * self.config.rounds,
+            steps: self.config.steps,
+            every: 1,
+            drawn_visibility: true,
+            widen: 1.0,
+            settled_from: 0.5,
+        };
+        let start = BodyState::from_params(params);
+        let found = align(&shaped, &start, &observation, &context, &effort);
+        Ok(RegisteredFrame { tracking: tracked(&found), ..frame.clone() })
+    }
+
+    fn observe(&self, frame: &RegisteredFrame) -> Option<Observation> {
+        let config = &self.config;
+        let looks = ObserveConfig {
+            points: config.points,
+            rim_px: config.rim_px,
+            normal_error_rad: config.normal_error_rad,
+            cell_m: 0.01,
+            min_px: config.min_person_px,
+        };
+        Observation::new(&frame.clean, &self.camera, frame.world_from_camera, &looks)
+    }
+}
