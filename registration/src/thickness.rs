@@ -58,12 +58,12 @@ impl Scatter {
         if all.len() < ENOUGH || noise_m2 > QUIET_M * QUIET_M {
             return None;
         }
-        let everywhere_m = thickness_m(&mut all, noise_m2);
+        let everywhere_m = thickness_m(&mut all);
         let by_region_m = self.distances_m.map(|mut distances_m| {
             if distances_m.len() < ENOUGH_OF_REGION {
                 everywhere_m
             } else {
-                thickness_m(&mut distances_m, noise_m2)
+                thickness_m(&mut distances_m)
             }
         });
         tracing::debug!(everywhere_m, ?by_region_m, "clothes stand off");
@@ -71,20 +71,18 @@ impl Scatter {
     }
 }
 
-/// From how much the distances scatter beyond noise of this variance.
-fn thickness_m(distances_m: &mut [f32], noise_m2: f32) -> f32 {
+/// From how much the distances scatter.
+fn thickness_m(distances_m: &mut [f32]) -> f32 {
     distances_m.sort_unstable_by(f32::total_cmp);
     let at = |share: f32| distances_m[((distances_m.len() - 1) as f32 * share) as usize];
     let deviation_m = (at(0.75) - at(0.25)) / QUARTILES_APART;
     tracing::debug!(
         count = distances_m.len(),
         deviation_m,
-        noise_m = noise_m2.sqrt(),
         median_m = at(0.5),
         "scatter"
     );
-    let of_cloth_m = (deviation_m * deviation_m - noise_m2).max(0.0).sqrt();
-    (MEAN_OF_DEVIATION * of_cloth_m).clamp(THINNEST_M, THICKEST_M)
+    (MEAN_OF_DEVIATION * deviation_m).clamp(THINNEST_M, THICKEST_M)
 }
 
 #[cfg(test)]
