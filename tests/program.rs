@@ -251,6 +251,9 @@ fn settings_that_mean_nothing_are_refused_with_what_was_expected() {
     let here = folder.path();
     for (settings, expected) in [
         ("[fine_tune]\nsteps = 0\n", "at least 1"),
+        ("[fine_tune]\ndoubt_m = nan\n", "expected metres"),
+        ("[refine]\npasses = 4000000000\n", "at most 8"),
+        ("[refine]\npasses = 1\nsteps = 0\n", "1 to 10000"),
         ("[keyframes]\ncount = 0\n", "1 to 64"),
         ("[clean]\nrange_m = [4.0, 0.5]\n", "nearest"),
         ("[clean]\nrang_m = [0.5, 4.0]\n", "rang_m"),

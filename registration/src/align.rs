@@ -118,6 +118,7 @@ impl EnergyConfig {
     pub(crate) fn with_clothes(&self, thickness_m: &[f32; REGION_COUNT]) -> Self {
         let standoff_m = self.cloth_standoff_m.max(1e-4);
         Self {
+            cloth_standoff_m: standoff_m,
             cloth_by_region: thickness_m.map(|thickness_m| thickness_m / standoff_m),
             ..*self
         }
@@ -125,14 +126,11 @@ impl EnergyConfig {
 
     /// How far outside of the expected clothes a point costs one: the thicker they are, the less is known of them.
     fn cloth_outside_m(&self, times: f32) -> f32 {
-        /// Cloth of any kind has folds, and none is known worse.
+        /// Cloth of any kind has folds, and none is known worse; unless the configuration says so.
         const KNOWN_TO_M: [f32; 2] = [0.010, 0.040];
-        let [best, worst] = KNOWN_TO_M;
-        if times == 1.0 {
-            self.cloth_outside_m
-        } else {
-            (self.cloth_outside_m * times).clamp(best, worst)
-        }
+        let configured_m = self.cloth_outside_m;
+        let [best_m, worst_m] = KNOWN_TO_M;
+        (configured_m * times).clamp(best_m.min(configured_m), worst_m.max(configured_m))
     }
 }
 

@@ -45,8 +45,7 @@ fn make_dataset(args: &DatasetMakeArgs) -> anyhow::Result<()> {
     }
     let mut plan = DatasetPlan::new(args.preset, args.seed);
     if !args.only.is_empty() {
-        let wanted = |name: &str| args.only.iter().any(|part| name.contains(part));
-        plan.sequences.retain(|sequence| wanted(&sequence.name));
+        plan.keep_only(&args.only);
         ensure!(
             !plan.sequences.is_empty(),
             "--only {}: no sequence of this data set is called anything like it; names look like test-003-blazer-trousers-bend",

@@ -264,10 +264,9 @@ impl Work {
         )?
         .with_camera(&self.camera);
         let prior = self.settings.prior_network(self.body.identity)?;
-        let tuning_started = self.clock.secs();
+        let learning_started = self.clock.secs();
         let subject = canonicaliser.subject();
         let motions = map_motions(&RestBody::of(&self.body, &subject.betas));
-        // Fine-tuning refuses to start without samples.
         let driver_of = |network: HyperNetwork, map: &MapConfig| {
             let skinning = &**canonicaliser.skinning();
             let theta = self.keyframes[self.keyframes.len() / 2].params.theta;
@@ -276,18 +275,19 @@ impl Work {
             self.driver_of(Arc::new(avatar), &motions, map)
         };
         let before = self.settings.refine.steps_in_all();
-        let steps = before + self.settings.fine_tune.steps;
+        let steps = before.saturating_add(self.settings.fine_tune.steps);
         let mut on_step = |now: &FineTuneProgress, network: &HyperNetwork| {
             let step = now.step;
             if step == self.settings.preview.steps && step < steps {
                 let made = driver_of(network.clone(), &self.map_of_preview());
                 self.show(made, started);
             }
-            let elapsed_secs = self.clock.secs() - tuning_started;
+            let elapsed_secs = self.clock.secs() - learning_started;
             let left_secs = elapsed_secs * f64::from(steps - step) / f64::from(step.max(1));
             self.report(&FineTuneProgress { steps, elapsed_secs, left_secs, ..*now })
         };
         let samples = self.samples(&canonicaliser, &prior, &mut on_step)?;
+        let tuning_started = self.clock.secs();
         let mut last = FineTuneProgress::default();
         let network = fine_tune(
             prior,

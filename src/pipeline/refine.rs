@@ -6,6 +6,7 @@
 
 use std::{ops::ControlFlow, sync::Arc};
 
+use anyhow::ensure;
 use effigy_avatar::{
     Avatar, AvatarError, CanonicalSamples, Canonicaliser, PoseField, TopologyConfig,
     fine_tune::{FineTuneConfig, FineTuneProgress, fine_tune},
@@ -20,13 +21,17 @@ use serde::{Deserialize, Serialize};
 
 use super::settings::Settings;
 
+/// More passes only drift, and more steps find nobody else.
+const MOST_PASSES: u32 = 8;
+const MOST_STEPS: u32 = 10_000;
+
 /// Whether and how keyframes are refined.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub(crate) struct RefineConfig {
-    /// How often all keyframes are looked at again; 0 for never.
+    /// How often all keyframes are looked at again; 0 for never, [`MOST_PASSES`] at most.
     pub(crate) passes: u32,
-    /// Fine-tuning steps before each pass; all of them look for who it is.
+    /// Fine-tuning steps before each pass, [`MOST_STEPS`] at most; all of them look for who it is.
     pub(crate) steps: u32,
 }
 
@@ -37,6 +42,20 @@ impl Default for RefineConfig {
 }
 
 impl RefineConfig {
+    /// Refuses what would run and mean nothing, or not end.
+    pub(crate) fn check(self) -> anyhow::Result<()> {
+        let Self { passes, steps } = self;
+        ensure!(
+            passes <= MOST_PASSES,
+            "refine.passes is {passes}, expected at most {MOST_PASSES}, or 0 for none"
+        );
+        ensure!(
+            (1..=MOST_STEPS).contains(&steps),
+            "refine.steps is {steps}, expected 1 to {MOST_STEPS}"
+        );
+        Ok(())
+    }
+
     /// Steps of all passes.
     pub(crate) fn steps_in_all(self) -> u32 {
         self.passes * self.steps
@@ -63,6 +82,9 @@ impl Refinement<'_> {
         on_step: &mut OnStep<'_>,
     ) -> anyhow::Result<Vec<RegisteredFrame>> {
         let Self { body, camera, settings, .. } = *self;
+        if settings.refine.passes == 0 {
+            return Ok(tracked.to_vec());
+        }
         let refiner = Refiner::new(Arc::clone(body), *camera, settings.track.clone());
         let mut keyframes = tracked.to_vec();
         for pass in 0..settings.refine.passes {

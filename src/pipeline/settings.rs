@@ -139,6 +139,12 @@ impl Settings {
             steps >= 1,
             "fine_tune.steps is {steps}, expected at least 1"
         );
+        let doubt_m = self.fine_tune.doubt_m;
+        ensure!(
+            doubt_m.is_finite() && doubt_m >= 0.0,
+            "fine_tune.doubt_m is {doubt_m}, expected metres, or 0 for no doubts"
+        );
+        self.refine.check()?;
         let threads = self.fine_tune.threads.count;
         ensure!(
             threads <= MOST_THREADS,

@@ -140,7 +140,7 @@ fn a_pose_is_nearer_once_it_is_known_what_is_worn() {
         after_mm += scene.v2v_mm(&refined).expect("it is tracked still");
     }
     println!("sums of V2V: {before_mm} mm before, {after_mm} mm after");
-    assert!(after_mm < 0.9 * before_mm, "{before_mm} {after_mm}");
+    assert!(after_mm < 0.85 * before_mm, "{before_mm} {after_mm}");
 }
 
 #[test]

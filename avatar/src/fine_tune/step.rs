@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     FineTuneConfig,
-    sampling::{self, KeyframePoints},
+    sampling::{self, KeyframePoints, SurfacePoint},
 };
 use crate::{
     CanonicalSamples, PoseInput, SignedDistanceField as _,
@@ -161,9 +161,8 @@ impl FineTuner {
         }
         let (_, parameters) = self.network.forward(&self.poses);
         for (keyframe, parameters) in self.keyframes.iter_mut().zip(parameters) {
-            let points: Vec<Vec3> = keyframe.surface.iter().map(|at| at.point).collect();
-            let mut values = vec![0.0; points.len()];
-            SirenField::new(self.network.config().field, parameters).values(&points, &mut values);
+            let field = SirenField::new(self.network.config().field, parameters);
+            let values = values_at(&field, &keyframe.surface);
             for (at, value) in keyframe.surface.iter_mut().zip(values) {
                 at.weight /= 1.0 + (value / half).powi(2);
             }
@@ -176,9 +175,8 @@ impl FineTuner {
         let (mut sum, mut weights) = (0.0_f64, 0.0_f64);
         for (keyframe, parameters) in self.keyframes.iter().zip(parameters) {
             let held_out = &keyframe.held_out[..keyframe.held_out.len().min(HELD_OUT_POINTS)];
-            let points: Vec<Vec3> = held_out.iter().map(|at| at.point).collect();
-            let mut values = vec![0.0; points.len()];
-            SirenField::new(self.network.config().field, parameters).values(&points, &mut values);
+            let field = SirenField::new(self.network.config().field, parameters);
+            let values = values_at(&field, held_out);
             for (value, at) in values.iter().zip(held_out) {
                 sum += f64::from(value.abs() * at.weight);
                 weights += f64::from(at.weight);
@@ -198,6 +196,14 @@ impl FineTuner {
     pub fn into_network(self) -> HyperNetwork {
         self.network
     }
+}
+
+/// The field's values, unit lengths, at points that were measured.
+fn values_at(field: &SirenField, measured: &[SurfacePoint]) -> Vec<f32> {
+    let points: Vec<Vec3> = measured.iter().map(|at| at.point).collect();
+    let mut values = vec![0.0; points.len()];
+    field.values(&points, &mut values);
+    values
 }
 
 fn check(samples: &[CanonicalSamples]) -> Result<(), AvatarError> {

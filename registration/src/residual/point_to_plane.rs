@@ -40,7 +40,7 @@ impl Term for PointToPlane<'_> {
         for found in self.matches {
             let vertex = found.vertex as usize;
             let surface = &body.shaped.surface;
-            let region = usize::from(surface.region[vertex]);
+            let region = surface.region[vertex] as usize;
             let standoff_m = self.standoff_m[region] * surface.clothed[vertex]
                 + self.hair_m * surface.hairy[vertex];
             let distance_m = found.normal.dot(found.point - body.vertices[vertex]) - standoff_m;

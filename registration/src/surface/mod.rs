@@ -32,8 +32,8 @@ pub(crate) struct Surface {
     pub(crate) pose_dirs: Vec<PoseDirection>,
     /// For each vertex the share of it that clothes cover on most people: all but head, hands and feet.
     pub(crate) clothed: Vec<f32>,
-    /// For each vertex its number among [`REGION_COUNT`]: clothes are not equally thick everywhere.
-    pub(crate) region: Vec<u8>,
+    /// For each vertex the part of the body it is on: clothes are not equally thick everywhere.
+    pub(crate) region: Vec<Region>,
     /// For each vertex 1 where most people have hair, else 0.
     pub(crate) hairy: Vec<f32>,
     /// For each vertex whether clothes span a hollow there instead of following the skin.
@@ -53,16 +53,27 @@ fn clothed_share(weights: &VertexWeights) -> f32 {
         .sum()
 }
 
-/// Trunk, upper arms, forearms, thighs, shins.
-pub(crate) const REGION_COUNT: usize = 5;
+/// A part of the body with clothes of its own; hands and feet go with the limb, the head with the trunk.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Region {
+    Trunk,
+    UpperArms,
+    Forearms,
+    Thighs,
+    Shins,
+}
 
-fn region(weights: &VertexWeights) -> u8 {
-    match weights.main_bone() {
-        16 | 17 => 1,
-        18..=23 => 2,
-        1 | 2 => 3,
-        4 | 5 | 7 | 8 | 10 | 11 => 4,
-        _ => 0,
+pub(crate) const REGION_COUNT: usize = Region::Shins as usize + 1;
+
+impl Region {
+    fn of(weights: &VertexWeights) -> Self {
+        match weights.main_bone() {
+            16 | 17 => Self::UpperArms,
+            18..=23 => Self::Forearms,
+            1 | 2 => Self::Thighs,
+            4 | 5 | 7 | 8 | 10 | 11 => Self::Shins,
+            _ => Self::Trunk,
+        }
     }
 }
 
@@ -132,7 +143,7 @@ impl Surface {
             .map(|&v| model.skinning[v as usize])
             .collect();
         let clothed = skinning.iter().map(clothed_share).collect();
-        let region = skinning.iter().map(region).collect();
+        let region = skinning.iter().map(Region::of).collect();
         let hairy = hairy(&model, &coarse.vertices, &skinning);
         let influences = skinning.iter().map(Influences::new).collect();
         let pose_dirs = restrict(&model.pose_dirs, &coarse.vertices, model.vertex_count());

@@ -2,7 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::{align::EnergyConfig, fit::FitConfig, initialize::InitializeConfig};
+use crate::{
+    align::EnergyConfig, fit::FitConfig, initialize::InitializeConfig, observe::ObserveConfig,
+};
 
 /// Everything that can be set about tracking.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -44,6 +46,19 @@ pub struct TrackConfig {
     pub energy: EnergyConfig,
     pub search: InitializeConfig,
     pub fit: FitConfig,
+}
+
+impl TrackConfig {
+    /// How frames are looked at to follow a body in them.
+    pub(super) fn looks(&self) -> ObserveConfig {
+        ObserveConfig {
+            points: self.points,
+            rim_px: self.rim_px,
+            normal_error_rad: self.normal_error_rad,
+            cell_m: 0.01,
+            min_px: self.min_person_px,
+        }
+    }
 }
 
 impl Default for TrackConfig {

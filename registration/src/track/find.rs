@@ -110,10 +110,8 @@ impl Tracker {
     pub(super) fn observe_coarsely(&self, clean: &CleanFrame) -> Option<Observation> {
         let config = ObserveConfig {
             points: self.config.search_points,
-            rim_px: self.config.rim_px,
-            normal_error_rad: self.config.normal_error_rad,
             cell_m: 0.03,
-            min_px: self.config.min_person_px,
+            ..self.config.looks()
         };
         Observation::new(clean, &self.camera, self.world.world_from_camera(), &config)
     }

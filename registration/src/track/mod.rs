@@ -23,7 +23,7 @@ use self::phase::Phase;
 use crate::{
     align::{Aligned, Context, EnergyConfig},
     fit::ShapeFit,
-    observe::{Extent, Observation, ObserveConfig},
+    observe::{Extent, Observation},
     registered::{RegisteredFrame, Tracking},
     residual::Prediction,
     smpl::BodyModel,
@@ -156,17 +156,15 @@ impl Tracker {
     }
 
     fn observe(&self, clean: &CleanFrame) -> Option<Observation> {
-        let config = ObserveConfig {
-            points: self.config.points,
-            rim_px: self.config.rim_px,
-            normal_error_rad: self.config.normal_error_rad,
-            cell_m: 0.01,
-            min_px: self.config.min_person_px,
-        };
         if clean.visibility == PersonVisibility::Nobody {
             return None;
         }
-        Observation::new(clean, &self.camera, self.world.world_from_camera(), &config)
+        Observation::new(
+            clean,
+            &self.camera,
+            self.world.world_from_camera(),
+            &self.config.looks(),
+        )
     }
 
     /// Whether so much of the body is outside the picture that a fit would be a guess.

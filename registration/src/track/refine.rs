@@ -9,7 +9,7 @@ use super::{TrackConfig, tracked, worn::offsets_in_zero_pose};
 use crate::{
     align::{Context, Effort, align},
     error::RegistrationError,
-    observe::{Observation, ObserveConfig},
+    observe::Observation,
     registered::RegisteredFrame,
     residual::Prediction,
     smpl::{BodyModel, BodyParams, JOINT_COUNT},
@@ -41,7 +41,12 @@ impl Refiner {
         near: &BodyParams,
         offsets_in_canonical: &[Vec3],
     ) -> Result<RegisteredFrame, RegistrationError> {
-        let (Some(params), Some(observation)) = (frame.params(), self.observe(frame)) else {
+        let Some(params) = frame.params() else {
+            return Ok(frame.clone());
+        };
+        let (world_from_camera, looks) = (frame.world_from_camera, self.config.looks());
+        let seen = Observation::new(&frame.clean, &self.camera, world_from_camera, &looks);
+        let Some(observation) = seen else {
             return Ok(frame.clone());
         };
         let model = &self.surface.model;
@@ -70,17 +75,5 @@ impl Refiner {
         let start = BodyState::from_params(params);
         let found = align(&shaped, &start, &observation, &context, &effort);
         Ok(RegisteredFrame { tracking: tracked(&found), ..frame.clone() })
-    }
-
-    fn observe(&self, frame: &RegisteredFrame) -> Option<Observation> {
-        let config = &self.config;
-        let looks = ObserveConfig {
-            points: config.points,
-            rim_px: config.rim_px,
-            normal_error_rad: config.normal_error_rad,
-            cell_m: 0.01,
-            min_px: config.min_person_px,
-        };
-        Observation::new(&frame.clean, &self.camera, frame.world_from_camera, &looks)
     }
 }

@@ -151,6 +151,12 @@ impl DatasetPlan {
         Self { preset, seed, offset_step_m: STEP_M, sequences }
     }
 
+    /// Leaves out the sequences whose name contains none of these.
+    pub fn keep_only(&mut self, parts: &[String]) {
+        let wanted = |name: &str| parts.iter().any(|part| name.contains(part));
+        self.sequences.retain(|sequence| wanted(&sequence.name));
+    }
+
     pub fn frame_count(&self) -> u64 {
         let frames = self
             .sequences

@@ -322,3 +322,17 @@ fn settings_are_chosen_on_people_whom_neither_training_nor_tests_meet() {
         }
     }
 }
+
+#[test]
+fn a_part_of_a_data_set_is_made_and_the_rest_later_but_no_part_of_it_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut part = plan();
+    part.keep_only(&["train-".to_owned()]);
+    assert_eq!(part.sequences.len(), 1);
+    let first = made(&part, folder.path()).manifest().sequences[0].clone();
+    let whole = made(&plan(), folder.path());
+    assert_eq!(whole.manifest().sequences.len(), plan().sequences.len());
+    assert_eq!(whole.manifest().sequences[0].sha256, first.sha256);
+    let error = make(&part, &builtin::body(), folder.path(), &|_| true).unwrap_err();
+    assert!(error.to_string().contains("other sequences"), "{error}");
+}

@@ -23,22 +23,50 @@ const SNIPPET: usize = 10;
 /// What was tracked.
 pub(super) struct Tracked {
     pub(super) betas: [f32; 10],
-    /// Each keyframe, and those of the ten frames before it that were tracked; keyframes that were not are left out.
-    pub(super) keyframes: Vec<(RegisteredFrame, Vec<RegisteredFrame>)>,
-    /// Where the tracker has the pelvis, from where it is, in the pelvis' own axes: the mean over the keyframes.
-    pub(super) pelvis_off_m: Vec3,
+    /// Keyframes; those that were not tracked are left out.
+    pub(super) keyframes: Vec<RegisteredFrame>,
+    /// Of each, those of the ten frames before it that were tracked.
+    pub(super) before: Vec<Vec<RegisteredFrame>>,
+    /// Each one's true body, and where the camera truly stood.
+    truths: Vec<(BodyParams, Rigid3)>,
 }
 
-/// Looks at keyframes again, given the person's shape.
-pub(super) type Refine<'a> =
-    dyn Fn(&[RegisteredFrame], &[f32; 10]) -> anyhow::Result<Vec<RegisteredFrame>> + 'a;
+impl Tracked {
+    /// Where the keyframes have the pelvis, from where it is, in the pelvis' own axes: the mean.
+    pub(super) fn pelvis_off_m(&self, body: &BodyModel) -> Vec3 {
+        let pairs = self.keyframes.iter().zip(&self.truths);
+        let off = pairs.map(|(keyframe, truth)| pelvis_off(body, keyframe, truth));
+        off.sum::<Vec3>() / self.keyframes.len().max(1) as f32
+    }
+
+    /// Mean distance of the keyframes' joints to the true ones, compared in the camera.
+    pub(super) fn joints_off_mm(&self, body: &BodyModel) -> f32 {
+        let (mut sum, mut count) = (0.0, 0);
+        for (keyframe, (truth, world_from_camera)) in self.keyframes.iter().zip(&self.truths) {
+            let Some(params) = keyframe.params() else {
+                continue;
+            };
+            let joints = |params: &BodyParams, world_from_camera: &Rigid3| {
+                let camera_from_world = world_from_camera.inverse();
+                body.pose(params)
+                    .joints
+                    .map(|joint| camera_from_world * joint)
+            };
+            let found = joints(params, &keyframe.world_from_camera);
+            for (found, real) in found.iter().zip(joints(truth, world_from_camera)) {
+                sum += found.distance(real) * 1e3;
+                count += 1;
+            }
+        }
+        sum / count.max(1) as f32
+    }
+}
 
 pub(super) fn track(
     lessons: &[Lesson<'_>],
     views: &mut Views,
     body: &Arc<BodyModel>,
     config: &TrackConfig,
-    refine: &Refine<'_>,
 ) -> anyhow::Result<Tracked> {
     let run_ups = lessons
         .iter()
@@ -60,21 +88,7 @@ pub(super) fn track(
             before.push(followed);
         }
     }
-    let betas = follower.tracker.betas();
-    tracing::debug!(
-        mm = joints_off_mm(body, &keyframes, &truths),
-        "joints, as tracked"
-    );
-    let keyframes = refine(&keyframes, &betas)?;
-    tracing::debug!(
-        mm = joints_off_mm(body, &keyframes, &truths),
-        "joints, refined"
-    );
-    let off = keyframes.iter().zip(&truths);
-    let off = off.map(|(keyframe, truth)| pelvis_off(body, keyframe, truth));
-    let pelvis_off_m = off.sum::<Vec3>() / keyframes.len().max(1) as f32;
-    let keyframes = keyframes.into_iter().zip(before).collect();
-    Ok(Tracked { betas, keyframes, pelvis_off_m })
+    Ok(Tracked { betas: follower.tracker.betas(), keyframes, before, truths })
 }
 
 /// From the true pelvis to the tracked one, in the true one's axes; both worlds are compared in the camera.
@@ -92,32 +106,6 @@ fn pelvis_off(
     let real = world_from_camera.inverse() * pelvis(truth);
     let off_in_world = world_from_camera.rotation * (found - real);
     Quat::from_scaled_axis(truth.theta[0]).inverse() * off_in_world
-}
-
-/// Mean distance of the keyframes' joints to the true ones, compared in the camera.
-fn joints_off_mm(
-    body: &BodyModel,
-    keyframes: &[RegisteredFrame],
-    truths: &[(BodyParams, Rigid3)],
-) -> f32 {
-    let (mut sum, mut count) = (0.0, 0);
-    for (keyframe, (truth, world_from_camera)) in keyframes.iter().zip(truths) {
-        let Some(params) = keyframe.params() else {
-            continue;
-        };
-        let joints = |params: &BodyParams, world_from_camera: &Rigid3| {
-            let camera_from_world = world_from_camera.inverse();
-            body.pose(params)
-                .joints
-                .map(|joint| camera_from_world * joint)
-        };
-        let found = joints(params, &keyframe.world_from_camera);
-        for (found, real) in found.iter().zip(joints(truth, world_from_camera)) {
-            sum += found.distance(real) * 1e3;
-            count += 1;
-        }
-    }
-    sum / count.max(1) as f32
 }
 
 /// The frames that lead to a keyframe, and itself; and where the camera stands then in the data set's world.

@@ -12,12 +12,13 @@ use effigy_avatar::{
     hyper::{HyperNetwork, PRIOR_CONFIG, RateConfig},
     mesher,
 };
+use effigy_capture::CameraModel;
 use effigy_fusion::{TriangleMesh, mesh::sample::sample_surface};
-use effigy_registration::{BodyModel, BodyParams, RegisteredFrame};
+use effigy_registration::{BodyModel, BodyParams};
 use glam::{Quat, Vec3};
 
 use super::{
-    fitted::track,
+    fitted::{Tracked, track},
     plan::{Data, Job, Keyframes, Method, Poses},
     pretrain::Pretrained,
     subject::Subject,
@@ -158,31 +159,24 @@ fn see(job: &Job, given: &Given<'_>) -> anyhow::Result<(Seen, f64)> {
     let lessons = subject.lessons(job.data, settings.keyframes.count);
     let first = lessons.first().context("there are frames to learn from")?;
     let mut views = Views::new(job.camera, &settings.clean, job.seed);
-    let tracked = match job.poses {
+    let mut tracked = match job.poses {
         Poses::True => None,
-        Poses::Fitted => {
-            let camera = *views.camera();
-            let refine = |keyframes: &[RegisteredFrame], betas: &[f32; 10]| {
-                let config = settings.canonicalise.clone();
-                let canonicaliser =
-                    Canonicaliser::new(Arc::clone(body), betas, config)?.with_camera(&camera);
-                let prior = settings.prior_network(body.identity)?;
-                let (prior, canonicaliser, camera) = (&prior, &canonicaliser, &camera);
-                Refinement { body, camera, canonicaliser, prior, settings }
-                    .refined(keyframes, &mut |_, _| go_on())
-            };
-            Some(track(&lessons, &mut views, body, &settings.track, &refine)?)
-        }
+        Poses::Fitted => Some(track(&lessons, &mut views, body, &settings.track)?),
     };
     let betas = tracked
         .as_ref()
         .map_or(first.sequence.betas, |tracked| tracked.betas);
-    let pelvis_off_m = tracked
-        .as_ref()
-        .map_or(Vec3::ZERO, |tracked| tracked.pelvis_off_m);
     let config = CanonicaliseConfig { seed: job.seed, ..settings.canonicalise.clone() };
     let canonicaliser =
         Canonicaliser::new(Arc::clone(body), &betas, config)?.with_camera(views.camera());
+    if let Some(tracked) = &mut tracked {
+        tracing::debug!(mm = tracked.joints_off_mm(body), "joints, as tracked");
+        refine(tracked, views.camera(), &canonicaliser, given)?;
+        tracing::debug!(mm = tracked.joints_off_mm(body), "joints, as learned from");
+    }
+    let pelvis_off_m = tracked
+        .as_ref()
+        .map_or(Vec3::ZERO, |tracked| tracked.pelvis_off_m(body));
     let (mut samples, mut seconds) = (Vec::new(), 0.0);
     let mut take = |keyframe, neighbours: &[_]| {
         let start = clock.secs();
@@ -197,8 +191,8 @@ fn see(job: &Job, given: &Given<'_>) -> anyhow::Result<(Seen, f64)> {
         (Method::Oracle, _) => samples = whole_surfaces(subject, &canonicaliser),
         (Method::BareBody, None) => {}
         (_, Some(tracked)) => {
-            for (keyframe, before) in tracked.keyframes {
-                take(keyframe, &before);
+            for (keyframe, before) in tracked.keyframes.into_iter().zip(&tracked.before) {
+                take(keyframe, before);
             }
         }
         (_, None) => {
@@ -217,6 +211,22 @@ fn see(job: &Job, given: &Given<'_>) -> anyhow::Result<(Seen, f64)> {
         Seen { canonicaliser, samples, asked, pelvis_off_m },
         seconds,
     ))
+}
+
+/// Looks at tracked keyframes again, if the settings want that.
+fn refine(
+    tracked: &mut Tracked,
+    camera: &CameraModel,
+    canonicaliser: &Canonicaliser,
+    given: &Given<'_>,
+) -> anyhow::Result<()> {
+    let Given { body, settings, .. } = given;
+    if settings.refine.passes > 0 {
+        let prior = &settings.prior_network(body.identity)?;
+        tracked.keyframes = Refinement { body, camera, canonicaliser, prior, settings }
+            .refined(&tracked.keyframes, &mut |_, _| go_on())?;
+    }
+    Ok(())
 }
 
 /// The avatar, if what was learned has a surface.

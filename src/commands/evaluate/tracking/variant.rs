@@ -62,12 +62,16 @@ impl Variant {
         let track = &mut options.track;
         match self {
             Self::Default => {}
-            Self::NoClothTerm => track.energy = without_cloth(track.energy),
+            Self::NoClothTerm => {
+                track.energy = without_cloth(track.energy);
+                track.fit.learns_thickness = false;
+            }
             Self::TrueSurface => options.true_surface = true,
             Self::NoVisibility => track.energy.visible_only = false,
             Self::NoTemporalTerm => track.energy.temporal_weight = 0.0,
             Self::Sxyu => {
                 (track.points, track.rounds, track.steps) = (200, 3, 10);
+                track.fit.learns_thickness = false;
                 track.energy = EnergyConfig {
                     direction_m: 0.0,
                     oblique: -1.0,
