@@ -154,8 +154,8 @@ pub(crate) struct Effort {
     pub(crate) every: usize,
     /// Self-occlusion by drawing, or only by facing.
     pub(crate) drawn_visibility: bool,
-    /// Factor on the outlier scale in the first round; it falls to one in the last.
-    pub(crate) widen: f32,
+    /// Factor on the outlier scale in the first round and in the last.
+    pub(crate) widen: [f32; 2],
     /// From this share of the rounds on a step that gains nothing ends the alignment.
     pub(crate) settled_from: f32,
 }
@@ -235,7 +235,8 @@ pub(crate) fn align(
             };
         }
         let progress = rounds as f32 / (effort.rounds - 1).max(1) as f32;
-        evidence.widen = effort.widen + (1.0 - effort.widen) * progress;
+        let [first, last] = effort.widen;
+        evidence.widen = first + (last - first) * progress;
         evidence.gather(&body, &visibility, observation, &points, context);
         for _ in 0..effort.steps {
             let outcome = evidence.with_terms(observation, context, |terms| {

@@ -12,12 +12,12 @@ use std::{
 };
 
 use anyhow::Context as _;
-use crossbeam::channel::{Receiver, RecvTimeoutError, Sender, TrySendError, bounded};
+use crossbeam::channel::{Receiver, RecvTimeoutError, Sender, bounded};
 use effigy_capture::{
     Frame, FrameSource, Timestamp,
     replay::{Due, Pacer},
 };
-use effigy_registration::BodyModel;
+use effigy_registration::{BodyModel, Tracking};
 use effigy_viewer::PlaybackView;
 
 use super::{
@@ -34,14 +34,20 @@ use crate::interrupt;
 /// One frame waits while one is worked on; anything longer is latency.
 const QUEUE: usize = 1;
 
+/// While somebody is looked for, half a second of frames waits: they are recorded and shown a little late, not lost.
+const QUEUE_WHILE_LOST: usize = 15;
+/// Once somebody is found, so much of a place in the queue goes with each new frame: a machine that catches up loses no
+/// frame, and one that does not is current again within two seconds.
+const CATCHING_UP: f32 = 0.3;
+
 /// Commands are looked at this often while no frame comes.
 const COMMANDS_EVERY: Duration = Duration::from_millis(50);
 
 struct Delivered {
     frame: Frame,
     at: Duration,
-    /// The frame before this one was not the one before it in the source.
-    jumped: bool,
+    /// How often a frame was not the one after the last in the source, up to this one.
+    jumps: u64,
     dropped_so_far: u64,
     playback: Option<PlaybackView>,
 }
@@ -66,15 +72,15 @@ pub(crate) fn run(
 ) -> anyhow::Result<RunLog> {
     let (cleaning, tracking, hand_over) =
         stages(source.calibration(), Arc::clone(body), settings, clock);
-    let (to_clean, frames) = bounded(QUEUE);
+    let (to_clean, frames) = bounded(QUEUE_WHILE_LOST);
     // Handed over directly: a cleaned frame that waited would only be late.
     let (to_track, cleaned) = bounded(0);
     let (to_drive, tracked) = bounded(QUEUE);
     let stale_frames = frames.clone();
-    let stop = AtomicBool::new(false);
+    let (stop, lost) = (AtomicBool::new(false), AtomicBool::new(true));
     let mut log = RunLog::new(clock);
     thread::scope(|scope| {
-        let stop = &stop;
+        let (stop, lost) = (&stop, &lost);
         let capture = thread::Builder::new()
             .name("capture".to_owned())
             .spawn_scoped(scope, move || {
@@ -82,7 +88,8 @@ pub(crate) fn run(
                     &mut *source,
                     &to_clean,
                     &stale_frames,
-                    (clock, controls, stop),
+                    (clock, controls),
+                    (stop, lost),
                 )
             })
             .context("cannot start the capture thread")?;
@@ -97,7 +104,7 @@ pub(crate) fn run(
             .name("track".to_owned())
             .spawn_scoped(scope, move || {
                 let _stops = StopsCapture(stop);
-                track(tracking, &cleaned, &to_drive);
+                track(tracking, &cleaned, &to_drive, lost);
             })
             .context("cannot start the tracking thread")?;
         let driven = drive(
@@ -134,16 +141,18 @@ fn joined<T>(thread: ScopedJoinHandle<'_, anyhow::Result<T>>) -> anyhow::Result<
     thread.join().unwrap_or_else(|panic| resume_unwind(panic))
 }
 
-/// Delivers frames when their time has come; a frame that nobody took makes way for the next.
+/// Delivers frames when their time has come; where too many wait, the oldest make way.
 fn capture(
     source: &mut dyn FrameSource,
     to_clean: &Sender<Delivered>,
     waiting: &Receiver<Delivered>,
-    (clock, controls, stop): (Clock, &Controls, &AtomicBool),
+    (clock, controls): (Clock, &Controls),
+    (stop, lost): (&AtomicBool, &AtomicBool),
 ) -> anyhow::Result<Captured> {
     let mut captured = Captured::default();
     let mut pacer = Pacer::new(1.0);
     let mut before: Option<Timestamp> = None;
+    let (mut jumps, mut queue) = (0, Queue::default());
     let stopped = || interrupt::requested() || stop.load(Ordering::Relaxed);
     while !stopped() {
         let steered = controls.steer(source, stopped);
@@ -158,31 +167,45 @@ fn capture(
         };
         let looped = before.is_some_and(|before| frame.timestamp < before);
         let jumped = steered.jumped || looped;
+        jumps += u64::from(jumped);
         before = Some(frame.timestamp);
         captured.count(&frame, jumped);
         let at = wait_until_due(&mut pacer, frame.timestamp, clock);
-        let mut item = Delivered {
-            frame,
-            at,
-            jumped,
-            dropped_so_far: captured.too_late,
-            playback: controls.playback(source.player()),
-        };
-        loop {
-            match to_clean.try_send(item) {
-                Ok(()) => break,
-                Err(TrySendError::Full(back)) => {
-                    item = back;
-                    if let Ok(stale) = waiting.try_recv() {
-                        captured.too_late += 1;
-                        item.jumped |= stale.jumped;
-                    }
-                }
-                Err(TrySendError::Disconnected(_)) => return Ok(captured),
-            }
+        let length = queue.length(lost.load(Ordering::Relaxed));
+        while to_clean.len() >= length && waiting.try_recv().is_ok() {
+            captured.too_late += 1;
+        }
+        let dropped_so_far = captured.too_late;
+        let playback = controls.playback(source.player());
+        let item = Delivered { frame, at, jumps, dropped_so_far, playback };
+        if to_clean.send(item).is_err() {
+            break;
         }
     }
     Ok(captured)
+}
+
+/// How many frames may wait.
+struct Queue {
+    length: f32,
+}
+
+impl Default for Queue {
+    fn default() -> Self {
+        Self { length: QUEUE as f32 }
+    }
+}
+
+impl Queue {
+    /// Now that another frame comes.
+    fn length(&mut self, lost: bool) -> usize {
+        self.length = if lost {
+            QUEUE_WHILE_LOST as f32
+        } else {
+            (self.length - CATCHING_UP).max(QUEUE as f32)
+        };
+        self.length as usize
+    }
 }
 
 /// Returns when the frame was due: what is late from here on is our doing, or the source's.
@@ -207,12 +230,21 @@ fn clean(
     Ok(())
 }
 
-fn track(mut tracking: TrackStage, frames: &Receiver<Cleaned>, to_drive: &Sender<Tracked>) {
+fn track(
+    mut tracking: TrackStage,
+    frames: &Receiver<Cleaned>,
+    to_drive: &Sender<Tracked>,
+    lost: &AtomicBool,
+) {
+    let mut jumps = 0;
     for Cleaned { delivered, cleaned } in frames {
-        if delivered.jumped {
+        if delivered.jumps != jumps {
+            jumps = delivered.jumps;
             tracking.jumped();
         }
         let tracked = tracking.process(cleaned);
+        let is_lost = matches!(tracked.registered.tracking, Tracking::Lost { .. });
+        lost.store(is_lost, Ordering::Relaxed);
         if to_drive.send(Tracked { delivered, tracked }).is_err() {
             break;
         }
@@ -271,5 +303,20 @@ fn drive(
         log.registered(&tracked);
         outputs.record(&delivered.frame, &decided)?;
         outputs.frame(&delivered.frame, registered, mesh.as_ref(), (avatar, log))?;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn frames_wait_while_somebody_is_looked_for_and_ever_fewer_once_found() {
+        let mut queue = Queue::default();
+        assert_eq!(queue.length(false), QUEUE);
+        assert_eq!(queue.length(true), QUEUE_WHILE_LOST);
+        let lengths: Vec<usize> = (0..60).map(|_| queue.length(false)).collect();
+        assert!(lengths.is_sorted_by(|a, b| a >= b));
+        assert_eq!((lengths[0], lengths[59]), (QUEUE_WHILE_LOST - 1, QUEUE));
     }
 }

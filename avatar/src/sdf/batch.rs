@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use super::{
     config::SirenConfig,
     field::SpareWorkspaces,
-    kernel::{self, Network, TILE, Workspace},
+    kernel::{self, Network, Workspace, tile_points},
     loss::{LossConfig, LossPoint, LossTerms, Scale, point_loss},
 };
 
@@ -57,6 +57,7 @@ impl FieldGradients {
             .map(|frame| Network::new(self.config, frame.parameters))
             .collect();
         let (config, spare) = (self.config, &self.spare);
+        let tile = tile_points(config);
         self.units
             .par_iter_mut()
             .enumerate()
@@ -71,7 +72,7 @@ impl FieldGradients {
                         work,
                         &nets[frame],
                         &frames[frame],
-                        part,
+                        (part, tile),
                         (loss, scale),
                         unit,
                     );
@@ -97,15 +98,15 @@ fn run_unit(
     work: &mut Workspace,
     net: &Network<'_>,
     frame: &FieldFrame<'_>,
-    part: usize,
+    (part, tile): (usize, usize),
     (loss, scale): (&LossConfig, Scale),
     unit: &mut Unit,
 ) {
-    let tiles = frame.points.len().div_ceil(TILE);
+    let tiles = frame.points.len().div_ceil(tile);
     let first = tiles * part / UNITS_PER_FRAME;
     let last = tiles * (part + 1) / UNITS_PER_FRAME;
-    for tile in first..last {
-        let range = tile * TILE..((tile + 1) * TILE).min(frame.points.len());
+    for number in first..last {
+        let range = number * tile..((number + 1) * tile).min(frame.points.len());
         let (points, known) = (&frame.points[range.clone()], &frame.known[range]);
         kernel::values_and_gradients(work, net, points);
         for (index, known) in known.iter().enumerate() {

@@ -9,11 +9,11 @@ use rayon::prelude::*;
 use super::{
     SignedDistanceField,
     config::{OMEGA, SirenConfig},
-    kernel::{self, Network, TILE, Workspace},
+    kernel::{self, Network, Workspace, tile_points},
 };
 
 /// Below this many points a call stays on its own thread: waking others costs more.
-const PARALLEL_FROM: usize = 4 * TILE;
+const PARALLEL_FROM_TILES: usize = 4;
 
 /// A SIREN: unit-space point to signed distance in unit lengths, positive outside.
 #[derive(Clone, Debug, PartialEq)]
@@ -67,14 +67,17 @@ impl SirenField {
 impl SignedDistanceField for SirenField {
     fn values(&self, points: &[Vec3], out: &mut [f32]) {
         assert_eq!(points.len(), out.len(), "one value a point");
-        let net = Network::new(self.config, &self.parameters);
+        let (net, size) = (
+            Network::new(self.config, &self.parameters),
+            tile_points(self.config),
+        );
         let spare = SpareWorkspaces::new(self.config);
-        let tiles = points.par_chunks(TILE).zip(out.par_chunks_mut(TILE));
+        let tiles = points.par_chunks(size).zip(out.par_chunks_mut(size));
         let tile = |(points, out): (&[Vec3], &mut [f32])| {
             spare.with(|work| kernel::values(work, &net, points, out));
         };
-        if points.len() < PARALLEL_FROM {
-            points.chunks(TILE).zip(out.chunks_mut(TILE)).for_each(tile);
+        if points.len() < PARALLEL_FROM_TILES * size {
+            points.chunks(size).zip(out.chunks_mut(size)).for_each(tile);
         } else {
             tiles.for_each(tile);
         }
@@ -85,7 +88,10 @@ impl SignedDistanceField for SirenField {
             points.len() == values.len() && points.len() == gradients.len(),
             "one a point"
         );
-        let net = Network::new(self.config, &self.parameters);
+        let (net, size) = (
+            Network::new(self.config, &self.parameters),
+            tile_points(self.config),
+        );
         let spare = SpareWorkspaces::new(self.config);
         let tile = |((points, values), gradients): ((&[Vec3], &mut [f32]), &mut [Vec3])| {
             spare.with(|work| {
@@ -94,12 +100,12 @@ impl SignedDistanceField for SirenField {
                 gradients.copy_from_slice(&work.gradients[..points.len()]);
             });
         };
-        if points.len() < PARALLEL_FROM {
-            let tiles = points.chunks(TILE).zip(values.chunks_mut(TILE));
-            tiles.zip(gradients.chunks_mut(TILE)).for_each(tile);
+        if points.len() < PARALLEL_FROM_TILES * size {
+            let tiles = points.chunks(size).zip(values.chunks_mut(size));
+            tiles.zip(gradients.chunks_mut(size)).for_each(tile);
         } else {
-            let tiles = points.par_chunks(TILE).zip(values.par_chunks_mut(TILE));
-            tiles.zip(gradients.par_chunks_mut(TILE)).for_each(tile);
+            let tiles = points.par_chunks(size).zip(values.par_chunks_mut(size));
+            tiles.zip(gradients.par_chunks_mut(size)).for_each(tile);
         }
     }
 }

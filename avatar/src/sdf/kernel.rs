@@ -20,8 +20,14 @@ use super::{
 };
 use crate::nn::matmul::{View, Write, multiply};
 
-/// Points of one tile: 64 x 128 floats are 32 KiB, and a live tile's 24 arrays 0.8 MiB.
-pub(crate) const TILE: usize = 128;
+/// Points of one tile. Its arrays, five a sine layer, are to stay near the core: at the live size they come to 1.3 MiB.
+pub(crate) fn tile_points(config: SirenConfig) -> usize {
+    /// Wider networks take fewer points at a time.
+    const FLOATS: usize = 128 * 128;
+    /// Matrix products of fewer rows are slow.
+    const FEWEST: usize = 32;
+    (FLOATS / config.hidden).clamp(FEWEST, 128)
+}
 
 /// A network's parameters, seen layer by layer, with the first layer's weight by columns.
 pub(crate) struct Network<'a> {
@@ -103,7 +109,8 @@ struct LayerBuffers {
 
 impl Workspace {
     pub(crate) fn new(config: SirenConfig) -> Self {
-        let size = TILE * config.hidden;
+        let tile = tile_points(config);
+        let size = tile * config.hidden;
         let layer = || LayerBuffers {
             tangent_and_h: vec![0.0; 2 * size],
             p_and_z: vec![0.0; 2 * size],
@@ -113,16 +120,16 @@ impl Workspace {
             hidden: config.hidden,
             layers: (1..config.layers).map(|_| layer()).collect(),
             h_bar: vec![0.0; size],
-            values: vec![0.0; TILE],
-            gradients: vec![Vec3::ZERO; TILE],
-            value_bars: vec![0.0; TILE],
-            gradient_bars: vec![Vec3::ZERO; TILE],
+            values: vec![0.0; tile],
+            gradients: vec![Vec3::ZERO; tile],
+            value_bars: vec![0.0; tile],
+            gradient_bars: vec![Vec3::ZERO; tile],
             first_columns: std::array::from_fn(|_| vec![0.0; config.hidden]),
         }
     }
 }
 
-/// Values of up to [`TILE`] points.
+/// Values of a tile at most.
 pub(crate) fn values(work: &mut Workspace, net: &Network<'_>, points: &[Vec3], out: &mut [f32]) {
     let (count, hidden) = (points.len(), work.hidden);
     let size = count * hidden;
@@ -150,7 +157,7 @@ pub(crate) fn values(work: &mut Workspace, net: &Network<'_>, points: &[Vec3], o
     pass::dot_rows(h, v, bias[0], out);
 }
 
-/// Values and spatial gradients of up to [`TILE`] points, into the workspace.
+/// Values and spatial gradients of a tile at most, into the workspace.
 pub(crate) fn values_and_gradients(work: &mut Workspace, net: &Network<'_>, points: &[Vec3]) {
     let (count, hidden) = (points.len(), work.hidden);
     let size = count * hidden;
