@@ -1,0 +1,77 @@
+//! The drive on a graphics card, in turn with the processor's, and how far the two are apart.
+
+use std::sync::Arc;
+
+use effigy_avatar::{
+    Avatar, DriveConfig, Driver,
+    gpu::{Gpu, GpuDriver, GpuError},
+};
+use effigy_capture::FrameId;
+use effigy_registration::BodyParams;
+
+use super::{Row, in_turn::in_turn};
+
+/// Poses that the two are compared in.
+const COMPARED: usize = 30;
+
+/// On this machine's fastest adapter; one in software is measured too, and says so in its rows.
+pub(super) fn open() -> Result<Arc<Gpu>, GpuError> {
+    Gpu::of_this_machine().map(Arc::new)
+}
+
+/// One avatar in poses that `params` numbers.
+pub(super) fn rows(
+    gpu: &Arc<Gpu>,
+    avatar: &Arc<Avatar>,
+    params: &dyn Fn(usize) -> BodyParams,
+    rounds: usize,
+) -> Result<Vec<Row>, GpuError> {
+    let mut cpu = Driver::new(Arc::clone(avatar), DriveConfig::default());
+    let mut card = GpuDriver::new(gpu, &cpu)?;
+    let mut differences_mm = Vec::new();
+    for number in 0..COMPARED {
+        let params = params(number * 37);
+        let ours = card.pose(&params, FrameId(0))?.vertices;
+        let twins = cpu.pose(&params, FrameId(0)).vertices;
+        let pairs = ours.iter().zip(&twins);
+        differences_mm.extend(pairs.map(|(a, b)| f64::from(a.distance(*b)) * 1e3));
+    }
+    differences_mm.sort_by(f64::total_cmp);
+    let (mut a, mut b) = (0, 0);
+    let mut failed = Ok(());
+    let [by_cpu, by_card] = in_turn(
+        rounds,
+        [
+            &mut || {
+                cpu.pose(&params(a), FrameId(0));
+                a += 1;
+            },
+            &mut || {
+                let posed = card.pose(&params(b), FrameId(0)).map(drop);
+                if failed.is_ok() {
+                    failed = posed;
+                }
+                b += 1;
+            },
+        ],
+    );
+    failed?;
+    let kind = if gpu.is_software() {
+        " (in software)"
+    } else {
+        ""
+    };
+    let vertices = avatar.topology.vertices_in_unit.len();
+    let name = format!("drive on {}{kind}, {vertices} vertices", gpu.name());
+    let off = |share: usize| differences_mm[(differences_mm.len() - 1) * share / 100];
+    Ok(vec![
+        Row::new(name.clone(), by_card.recip(), "poses/s")
+            .against("the processor's full field", by_cpu / by_card),
+        Row::new(format!("{name}, off the processor's, p95"), off(95), "mm"),
+        Row::new(
+            format!("{name}, off the processor's, largest"),
+            off(100),
+            "mm",
+        ),
+    ])
+}

@@ -1,0 +1,106 @@
+//! A graphics card that drives avatars. Opening one takes tenths of a second, which the first frames need not wait for.
+
+use std::{
+    sync::Arc,
+    thread::{self, JoinHandle},
+};
+
+use anyhow::Context as _;
+use effigy_avatar::{
+    Driver, LiveDriver,
+    gpu::{Gpu, GpuError},
+    sdf::SirenConfig,
+};
+use effigy_viewer::SnapshotSlot;
+
+/// Open, being opened until the first avatar asks for it, or none.
+#[derive(Default)]
+pub(crate) struct GraphicsCard {
+    opening: Option<JoinHandle<Option<Arc<Gpu>>>>,
+    gpu: Option<Arc<Gpu>>,
+}
+
+impl GraphicsCard {
+    pub(crate) fn none() -> Self {
+        Self::default()
+    }
+
+    /// Any adapter, opened here and now; it is an error if there is none.
+    pub(crate) fn open(window: Option<&SnapshotSlot>) -> anyhow::Result<Self> {
+        let gpu = opener(window)()
+            .and_then(prepared)
+            .context("drive.device is \"gpu\" (\"auto\" would go on without one)")?;
+        Ok(Self { opening: None, gpu: Some(gpu) })
+    }
+
+    /// One that is worth it, if there is one.
+    pub(crate) fn look_for(window: Option<&SnapshotSlot>) -> anyhow::Result<Self> {
+        let open = opener(window);
+        let thread = thread::Builder::new()
+            .name("graphics card".to_owned())
+            .spawn(move || worth_it(open()))
+            .context("cannot start the thread that opens the graphics card")?;
+        Ok(Self { opening: Some(thread), gpu: None })
+    }
+
+    #[cfg(test)]
+    pub(crate) fn is_none(&self) -> bool {
+        self.opening.is_none() && self.gpu.is_none()
+    }
+
+    pub(crate) fn driver(&mut self, cpu: Driver) -> LiveDriver {
+        self.wait();
+        match &self.gpu {
+            Some(gpu) => LiveDriver::on_gpu(cpu, gpu),
+            None => LiveDriver::on_cpu(cpu),
+        }
+    }
+
+    fn wait(&mut self) {
+        if let Some(thread) = self.opening.take() {
+            // A panic inside a graphics driver costs the card, not the run.
+            self.gpu = thread.join().unwrap_or_default();
+        }
+    }
+}
+
+impl Drop for GraphicsCard {
+    /// Nobody may be inside a graphics driver when the program ends.
+    fn drop(&mut self) {
+        self.wait();
+    }
+}
+
+/// The window's adapter, or this machine's fastest.
+#[cfg(feature = "window")]
+fn opener(window: Option<&SnapshotSlot>) -> impl FnOnce() -> Result<Gpu, GpuError> + Send + use<> {
+    let adapter = window.and_then(|slot| slot.adapter().cloned());
+    move || match adapter {
+        Some(adapter) => Gpu::open(&adapter),
+        None => Gpu::of_this_machine(),
+    }
+}
+
+#[cfg(not(feature = "window"))]
+fn opener(_: Option<&SnapshotSlot>) -> fn() -> Result<Gpu, GpuError> {
+    Gpu::of_this_machine
+}
+
+fn prepared(gpu: Gpu) -> Result<Arc<Gpu>, GpuError> {
+    gpu.prepare(SirenConfig::LIVE.hidden)?;
+    Ok(Arc::new(gpu))
+}
+
+/// What nobody asked for by name must be faster than the processor.
+fn worth_it(opened: Result<Gpu, GpuError>) -> Option<Arc<Gpu>> {
+    let gpu = opened.and_then(|gpu| {
+        if gpu.is_software() {
+            tracing::info!(adapter = gpu.name(), "in software: the processor drives");
+            return Ok(None);
+        }
+        prepared(gpu).map(Some)
+    });
+    gpu.inspect_err(|reason| tracing::info!(%reason, "the processor drives"))
+        .ok()
+        .flatten()
+}
