@@ -23,6 +23,8 @@ use glam::Vec3;
 #[cfg(feature = "gpu-drive")]
 use super::gpu;
 use super::{Row, in_turn::in_turn};
+#[cfg(feature = "gpu-drive")]
+use crate::interrupt;
 use crate::pipeline::avatar_job::map_motions;
 
 /// MetaAvatar's grid, and one that a dense evaluation can afford here.
@@ -113,11 +115,17 @@ fn on_gpu(
             return Ok(Vec::new());
         }
     };
-    let rounds = if quick || gpu.is_software() { 20 } else { 600 };
+    let mut avatars = vec![Arc::clone(own)];
+    if !quick {
+        avatars.push(fine()?);
+    }
     let params = params_of(rest);
     let mut rows = Vec::new();
-    for avatar in [Arc::clone(own), fine()?] {
-        match gpu::rows(&gpu, &avatar, &params, rounds) {
+    for avatar in avatars {
+        if interrupt::requested() {
+            break;
+        }
+        match gpu::rows(&gpu, &avatar, &params, quick) {
             Ok(more) => rows.extend(more),
             Err(reason) => eprintln!("effigy: no more rows about a graphics card: {reason}"),
         }

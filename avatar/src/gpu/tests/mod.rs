@@ -54,19 +54,24 @@ fn driver(avatar: Avatar) -> Driver {
     Driver::new(Arc::new(avatar), DriveConfig::default())
 }
 
-/// The prior's person with a field of another shape, drawn at random: its vertices lie anywhere.
+/// The prior's person with a field of another shape, drawn at random, whose values are some millimetres: beyond what
+/// vertices may be moved by, clamped ones would all be alike.
 fn random_avatar(field: SirenConfig) -> Avatar {
     let config = HyperConfig { field, heads: HeadKind::LowRank(4), person: 0 };
     let mut network = HyperNetwork::untrained(config, 7);
+    let (weight, bias) = field.split_mut(&mut network.meta, field.layers - 1);
+    bias.fill(0.0);
+    weight.iter_mut().for_each(|weight| *weight *= 0.02);
     // Heads that know nothing add nothing, and no pose would differ from another.
     let mut rng = StdRng::seed_from_u64(8);
-    for values in network.values_mut() {
-        for value in values {
-            *value += rng.random_range(-1e-3..1e-3);
-        }
+    for value in network.values_mut().into_iter().flatten() {
+        *value += rng.random_range(-1e-3..1e-3);
     }
     Avatar { field: Arc::new(network), ..prior_avatar() }
 }
+
+/// Single precision, summed in another order, comes to 0.0003 mm; compilers may round otherwise.
+const MOST_P99_MM: f32 = 0.005;
 
 /// A step that ends beside the settled length may be the last one on one side only: a tenth of 3 mm is left to it then.
 const MOST_MM: f32 = 0.4;
@@ -81,7 +86,7 @@ fn differences_mm(a: &[Vec3], b: &[Vec3]) -> Vec<f32> {
     differences
 }
 
-fn assert_same(ours: &AvatarMesh, twin: &AvatarMesh, most_p99_mm: f32, most_mm: f32) {
+fn assert_same(ours: &AvatarMesh, twin: &AvatarMesh) {
     assert_eq!((ours.frame, ours.theta), (twin.frame, twin.theta));
     assert_eq!(ours.triangles, twin.triangles);
     for (what, a, b) in [
@@ -96,7 +101,7 @@ fn assert_same(ours: &AvatarMesh, twin: &AvatarMesh, most_p99_mm: f32, most_mm: 
         );
         println!("{what}: p99 {p99:.6} mm, largest {largest:.6} mm");
         assert!(
-            p99 < most_p99_mm && largest < most_mm,
+            p99 < MOST_P99_MM && largest < MOST_MM,
             "{what}: {p99} mm, {largest} mm"
         );
     }
@@ -112,7 +117,7 @@ fn assert_same(ours: &AvatarMesh, twin: &AvatarMesh, most_p99_mm: f32, most_mm: 
     assert!(p99 < MOST_NORMALS_P99_RAD, "{p99} rad");
 }
 
-fn compare(avatar: Avatar, most_p99_mm: f32, most_mm: f32) {
+fn compare(avatar: Avatar) {
     let Some(gpu) = gpu() else {
         return;
     };
@@ -135,11 +140,11 @@ fn compare(avatar: Avatar, most_p99_mm: f32, most_mm: f32) {
             of(50),
             of(99)
         );
-        assert_same(&ours, &twin, most_p99_mm, most_mm);
+        assert_same(&ours, &twin);
         // The same pose would pass for another one only if nothing depended on it.
         if let Some(before) = &before {
             let by_canonical = differences_mm(&before.canonical, &ours.canonical);
-            assert!(by_canonical[by_canonical.len() - 1] > 10.0 * most_mm);
+            assert!(by_canonical[by_canonical.len() - 1] > 10.0 * MOST_P99_MM);
         }
         before = Some(ours);
     }
@@ -147,12 +152,12 @@ fn compare(avatar: Avatar, most_p99_mm: f32, most_mm: f32) {
 
 #[test]
 fn a_gpu_poses_the_prior_as_the_processor_does() {
-    compare(prior_avatar(), 0.005, MOST_MM);
+    compare(prior_avatar());
 }
 
 #[test]
 fn a_gpu_poses_a_field_of_the_papers_shape_as_the_processor_does() {
-    compare(random_avatar(SirenConfig::PAPER), 0.02, MOST_MM);
+    compare(random_avatar(SirenConfig::PAPER));
 }
 
 #[test]
@@ -163,6 +168,6 @@ fn a_gpu_poses_small_and_shallow_fields_as_the_processor_does() {
         SirenConfig { hidden: 192, layers: 4 },
     ] {
         println!("{field:?}");
-        compare(random_avatar(field), 0.02, MOST_MM);
+        compare(random_avatar(field));
     }
 }
