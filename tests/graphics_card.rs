@@ -9,7 +9,7 @@ const SETTINGS: &str = "[fine_tune]\nsteps = 4\n[map]\nmodes = 0\n[preview]\nste
 /// Replays what was simulated, driven by `device`; what it said, or what went wrong.
 fn replay(here: &Path, device: &str, backend: Option<&str>) -> Result<String, String> {
     let settings = format!("{SETTINGS}[drive]\ndevice = \"{device}\"\n");
-    fs::write(here.join("settings.toml"), settings).unwrap();
+    fs::write(here.join("settings.toml"), settings).expect("the folder is this test's");
     let mut command = Command::new(env!("CARGO_BIN_EXE_effigy"));
     command
         .current_dir(here)

@@ -6,7 +6,7 @@ use effigy_capture::FrameId;
 use effigy_registration::BodyParams;
 
 #[cfg(feature = "gpu")]
-use crate::gpu::{Gpu, GpuDriver, GpuError};
+use crate::gpu::{Gpu, GpuDriver};
 use crate::{
     drive::{AvatarMesh, Driver},
     model::Avatar,
@@ -77,10 +77,15 @@ impl LiveDriver {
         self.gave_up.as_deref()
     }
 
+    /// Leaves the graphics card alone from now on.
     #[cfg(feature = "gpu")]
-    fn give_up(&mut self, reason: &GpuError) {
-        tracing::warn!(%reason, "the graphics card drives the avatar no more, the processor does");
+    pub fn give_up(&mut self, reason: &dyn std::fmt::Display) {
+        let reason = reason.to_string();
+        tracing::warn!(
+            reason,
+            "the avatar is driven without the graphics card from here on"
+        );
         self.gpu = None;
-        self.gave_up = Some(reason.to_string());
+        self.gave_up = Some(reason);
     }
 }

@@ -341,7 +341,7 @@ impl AvatarStage {
             let keyframes = making.keyframes.clone();
             self.learned_from.extend(&keyframes);
             self.preview = Some((Arc::clone(driver.avatar()), figures));
-            let driver = self.device.driver(driver);
+            let driver = self.device.driver(driver, &self.clock);
             self.made = Some(Made { driver, is_preview: true, frames_driven: 0, keyframes });
         }
     }
@@ -358,7 +358,7 @@ impl AvatarStage {
         let FinishedAvatar { driver, figures } = finished?;
         self.learned_from.extend(&keyframes);
         self.figures.push(figures);
-        let driver = self.device.driver(driver);
+        let driver = self.device.driver(driver, &self.clock);
         self.made = Some(Made { driver, is_preview: false, frames_driven: 0, keyframes });
         Ok(())
     }

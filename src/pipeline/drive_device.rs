@@ -4,7 +4,7 @@ use effigy_avatar::{Driver, LiveDriver};
 use effigy_viewer::SnapshotSlot;
 use serde::{Deserialize, Serialize};
 
-use super::{graphics_card::GraphicsCard, schedule::Schedule};
+use super::{clock::Clock, graphics_card::GraphicsCard, schedule::Schedule};
 
 /// `[drive]` in the settings.
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
@@ -46,8 +46,9 @@ impl DriveDevice {
         Ok(Self { card })
     }
 
-    pub(crate) fn driver(&mut self, cpu: Driver) -> LiveDriver {
-        self.card.driver(cpu)
+    /// `clock` tells whether a card that nobody asked for is worth it.
+    pub(crate) fn driver(&mut self, cpu: Driver, clock: &Clock) -> LiveDriver {
+        self.card.driver(cpu, clock)
     }
 }
 

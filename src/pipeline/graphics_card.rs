@@ -11,14 +11,26 @@ use effigy_avatar::{
     gpu::{Gpu, GpuError},
     sdf::SirenConfig,
 };
+use effigy_capture::FrameId;
+use effigy_registration::BodyParams;
 use effigy_viewer::SnapshotSlot;
+
+use super::clock::Clock;
 
 /// Open, being opened until the first avatar asks for it, or none.
 #[derive(Default)]
 pub(crate) struct GraphicsCard {
     opening: Option<JoinHandle<Option<Arc<Gpu>>>>,
     gpu: Option<Arc<Gpu>>,
+    /// Whether it still has to show that it is fast enough.
+    on_trial: bool,
 }
+
+/// What two cores take for a pose in the full field: who is slower than that is of no help.
+const MOST_SECS_A_POSE: f64 = 0.008;
+
+/// Poses of a trial, of which the fastest counts: the processor may be busy, and first ones find nothing in its place.
+const TRIED: u64 = 5;
 
 impl GraphicsCard {
     pub(crate) fn none() -> Self {
@@ -30,7 +42,7 @@ impl GraphicsCard {
         let gpu = opener(window)()
             .and_then(prepared)
             .context("drive.device is \"gpu\" (\"auto\" would go on without one)")?;
-        Ok(Self { opening: None, gpu: Some(gpu) })
+        Ok(Self { opening: None, gpu: Some(gpu), on_trial: false })
     }
 
     /// One that is worth it, if there is one.
@@ -40,7 +52,7 @@ impl GraphicsCard {
             .name("graphics card".to_owned())
             .spawn(move || worth_it(open()))
             .context("cannot start the thread that opens the graphics card")?;
-        Ok(Self { opening: Some(thread), gpu: None })
+        Ok(Self { opening: Some(thread), gpu: None, on_trial: true })
     }
 
     #[cfg(test)]
@@ -48,12 +60,25 @@ impl GraphicsCard {
         self.opening.is_none() && self.gpu.is_none()
     }
 
-    pub(crate) fn driver(&mut self, cpu: Driver) -> LiveDriver {
+    pub(crate) fn driver(&mut self, cpu: Driver, clock: &Clock) -> LiveDriver {
         self.wait();
-        match &self.gpu {
-            Some(gpu) => LiveDriver::on_gpu(cpu, gpu),
-            None => LiveDriver::on_cpu(cpu),
+        let Some(gpu) = &self.gpu else {
+            return LiveDriver::on_cpu(cpu);
+        };
+        let mut driver = LiveDriver::on_gpu(cpu, gpu);
+        if self.on_trial && driver.gave_up().is_none() {
+            let secs = fastest_pose_secs(&mut driver, clock);
+            if secs > MOST_SECS_A_POSE {
+                let [took_ms, most_ms] = [secs, MOST_SECS_A_POSE].map(|secs| secs * 1e3);
+                driver.give_up(&format_args!(
+                    "{} takes {took_ms:.1} ms a pose, the processor no more than {most_ms:.0}",
+                    gpu.name()
+                ));
+                self.gpu = None;
+            }
+            self.on_trial = false;
         }
+        driver
     }
 
     fn wait(&mut self) {
@@ -62,6 +87,17 @@ impl GraphicsCard {
             self.gpu = thread.join().unwrap_or_default();
         }
     }
+}
+
+fn fastest_pose_secs(driver: &mut LiveDriver, clock: &Clock) -> f64 {
+    let theta = driver.avatar().topology_theta;
+    let params = BodyParams { theta, ..BodyParams::ZERO };
+    let mut pose_secs = |number| {
+        let started = clock.secs();
+        driver.pose(&params, FrameId(number));
+        clock.secs() - started
+    };
+    (0..TRIED).map(&mut pose_secs).fold(f64::INFINITY, f64::min)
 }
 
 impl Drop for GraphicsCard {

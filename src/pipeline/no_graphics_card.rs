@@ -4,6 +4,8 @@ use anyhow::bail;
 use effigy_avatar::{Driver, LiveDriver};
 use effigy_viewer::SnapshotSlot;
 
+use super::clock::Clock;
+
 pub(crate) struct GraphicsCard;
 
 impl GraphicsCard {
@@ -36,7 +38,7 @@ impl GraphicsCard {
         clippy::unused_self,
         reason = "one interface with and without the feature"
     )]
-    pub(crate) fn driver(&mut self, cpu: Driver) -> LiveDriver {
+    pub(crate) fn driver(&mut self, cpu: Driver, _: &Clock) -> LiveDriver {
         LiveDriver::on_cpu(cpu)
     }
 }

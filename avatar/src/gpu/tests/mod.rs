@@ -6,7 +6,7 @@ mod sine;
 use std::sync::Arc;
 
 use effigy_capture::FrameId;
-use effigy_registration::smpl::builtin;
+use effigy_registration::{BodyParams, smpl::builtin};
 use glam::Vec3;
 use rand::{RngExt as _, SeedableRng as _, rngs::StdRng};
 
@@ -61,11 +61,13 @@ fn random_avatar(field: SirenConfig) -> Avatar {
     let mut network = HyperNetwork::untrained(config, 7);
     let (weight, bias) = field.split_mut(&mut network.meta, field.layers - 1);
     bias.fill(0.0);
-    weight.iter_mut().for_each(|weight| *weight *= 0.02);
-    // Heads that know nothing add nothing, and no pose would differ from another.
+    for weight in weight {
+        *weight *= 0.02;
+    }
+    // Heads that know nothing add nothing.
     let mut rng = StdRng::seed_from_u64(8);
     for value in network.values_mut().into_iter().flatten() {
-        *value += rng.random_range(-1e-3..1e-3);
+        *value += rng.random_range(-3e-4..3e-4);
     }
     Avatar { field: Arc::new(network), ..prior_avatar() }
 }
@@ -117,14 +119,14 @@ fn assert_same(ours: &AvatarMesh, twin: &AvatarMesh) {
     assert!(p99 < MOST_NORMALS_P99_RAD, "{p99} rad");
 }
 
-fn compare(avatar: Avatar) {
+/// The meshes of some poses, the same on both sides; none without an adapter.
+fn compared(avatar: Avatar) -> Vec<AvatarMesh> {
     let Some(gpu) = gpu() else {
-        return;
+        return Vec::new();
     };
     let mut cpu = driver(avatar);
     let mut ours = GpuDriver::new(&gpu, &cpu).unwrap();
-    let mut before: Option<AvatarMesh> = None;
-    for (number, params) in everyday_poses().iter().enumerate() {
+    let mut posed = |(number, params): (usize, &BodyParams)| {
         let frame = FrameId(number as u64);
         let (ours, twin) = (ours.pose(params, frame).unwrap(), cpu.pose(params, frame));
         let rest = &cpu.avatar().topology.vertices_in_unit;
@@ -141,23 +143,31 @@ fn compare(avatar: Avatar) {
             of(99)
         );
         assert_same(&ours, &twin);
-        // The same pose would pass for another one only if nothing depended on it.
-        if let Some(before) = &before {
-            let by_canonical = differences_mm(&before.canonical, &ours.canonical);
-            assert!(by_canonical[by_canonical.len() - 1] > 10.0 * MOST_P99_MM);
-        }
-        before = Some(ours);
-    }
+        ours
+    };
+    everyday_poses()
+        .iter()
+        .enumerate()
+        .map(&mut posed)
+        .collect()
 }
 
 #[test]
 fn a_gpu_poses_the_prior_as_the_processor_does() {
-    compare(prior_avatar());
+    for pair in compared(prior_avatar()).windows(2) {
+        // One pose would pass for another if nothing depended on it.
+        for (a, b) in [
+            (&pair[0].canonical, &pair[1].canonical),
+            (&pair[0].vertices, &pair[1].vertices),
+        ] {
+            assert!(differences_mm(a, b)[a.len() * 99 / 100] > 5.0);
+        }
+    }
 }
 
 #[test]
 fn a_gpu_poses_a_field_of_the_papers_shape_as_the_processor_does() {
-    compare(random_avatar(SirenConfig::PAPER));
+    compared(random_avatar(SirenConfig::PAPER));
 }
 
 #[test]
@@ -168,6 +178,6 @@ fn a_gpu_poses_small_and_shallow_fields_as_the_processor_does() {
         SirenConfig { hidden: 192, layers: 4 },
     ] {
         println!("{field:?}");
-        compare(random_avatar(field));
+        compared(random_avatar(field));
     }
 }
