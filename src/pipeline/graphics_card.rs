@@ -140,3 +140,59 @@ fn worth_it(opened: Result<Gpu, GpuError>) -> Option<Arc<Gpu>> {
         .ok()
         .flatten()
 }
+
+#[cfg(test)]
+mod tests {
+    use effigy_avatar::{
+        Avatar, DriveConfig, Subject, TopologyConfig, hyper,
+        skinning::{ClosestBodyPoint, ClosestBodyPointConfig},
+    };
+    use effigy_registration::smpl::builtin;
+
+    use super::*;
+
+    fn driver() -> Driver {
+        let body = builtin::body();
+        let subject = Subject::new(&body, &[0.0; 10]).unwrap();
+        let skinning = ClosestBodyPoint::new(body, &[0.0; 10], ClosestBodyPointConfig::default());
+        let (field, theta) = (Arc::new(hyper::prior()), BodyParams::ZERO.theta);
+        let topology = TopologyConfig { vertices: 4000, ..TopologyConfig::default() };
+        let avatar = Avatar::new(&subject, field, &skinning, &theta, &topology).unwrap();
+        Driver::new(Arc::new(avatar), DriveConfig::default())
+    }
+
+    #[test]
+    fn a_card_on_trial_drives_if_it_is_fast_and_one_asked_for_by_name_in_any_case() {
+        let gpu = match Gpu::of_this_machine() {
+            Ok(gpu) => Arc::new(gpu),
+            Err(reason) => {
+                println!("skipped: {reason}");
+                return;
+            }
+        };
+        let clock = Clock::start();
+        let named =
+            |on_trial| GraphicsCard { opening: None, gpu: Some(Arc::clone(&gpu)), on_trial };
+        let by_card = format!("{}, full field", gpu.name());
+        let asked_for = named(false).driver(driver(), &clock);
+        assert_eq!(
+            (asked_for.device(), asked_for.gave_up()),
+            (by_card.clone(), None)
+        );
+
+        let mut card = named(true);
+        let tried = card.driver(driver(), &clock);
+        println!("{}, {:?}", tried.device(), tried.gave_up());
+        assert_eq!(tried.gave_up().is_some(), card.gpu.is_none());
+        match tried.gave_up() {
+            Some(reason) => {
+                assert!(reason.contains("ms a pose"), "{reason}");
+                assert_eq!(tried.device(), "CPU, full field");
+            }
+            None => assert_eq!(tried.device(), by_card),
+        }
+        // Four thousand vertices take the processor a tenth of a second if it has to play the card.
+        assert!(!gpu.is_software() || tried.gave_up().is_some());
+        assert_eq!(card.driver(driver(), &clock).device(), tried.device());
+    }
+}

@@ -20,11 +20,7 @@ use effigy_registration::{
 };
 use glam::Vec3;
 
-#[cfg(feature = "gpu-drive")]
-use super::gpu;
-use super::{Row, in_turn::in_turn};
-#[cfg(feature = "gpu-drive")]
-use crate::interrupt;
+use super::{Row, gpu, in_turn::in_turn};
 use crate::pipeline::avatar_job::map_motions;
 
 /// MetaAvatar's grid, and one that a dense evaluation can afford here.
@@ -52,7 +48,7 @@ pub(super) fn rows(quick: bool) -> anyhow::Result<Vec<Row>> {
         let topology = TopologyConfig { vertices: FINE_VERTICES, ..TopologyConfig::default() };
         avatar(topology)
     };
-    rows.extend(on_gpu(&own, fine, &rest, quick)?);
+    rows.extend(gpu::rows(&own, fine, &params_of(&rest), quick)?);
     let sdf = network.field(&subject.pose_input(&theta));
     rows.extend(meshes(&sdf, if quick { 64 } else { RESOLUTION }, quick));
     Ok(rows)
@@ -98,50 +94,6 @@ fn poses(avatar: &Arc<Avatar>, rest: &RestBody, count: usize) -> anyhow::Result<
         ),
         Row::new("vertices driven", vertices as f64, ""),
     ])
-}
-
-/// The same on a graphics card, with the avatar's own vertices and with more than three times as many.
-#[cfg(feature = "gpu-drive")]
-fn on_gpu(
-    own: &Arc<Avatar>,
-    fine: impl FnOnce() -> anyhow::Result<Arc<Avatar>>,
-    rest: &RestBody,
-    quick: bool,
-) -> anyhow::Result<Vec<Row>> {
-    let gpu = match gpu::open() {
-        Ok(gpu) => gpu,
-        Err(reason) => {
-            eprintln!("effigy: no rows about a graphics card: {reason}");
-            return Ok(Vec::new());
-        }
-    };
-    let mut avatars = vec![Arc::clone(own)];
-    if !quick {
-        avatars.push(fine()?);
-    }
-    let params = params_of(rest);
-    let mut rows = Vec::new();
-    for avatar in avatars {
-        if interrupt::requested() {
-            break;
-        }
-        match gpu::rows(&gpu, &avatar, &params, quick) {
-            Ok(more) => rows.extend(more),
-            Err(reason) => eprintln!("effigy: no more rows about a graphics card: {reason}"),
-        }
-    }
-    Ok(rows)
-}
-
-#[cfg(not(feature = "gpu-drive"))]
-fn on_gpu(
-    _: &Arc<Avatar>,
-    _: impl FnOnce() -> anyhow::Result<Arc<Avatar>>,
-    _: &RestBody,
-    _: bool,
-) -> anyhow::Result<Vec<Row>> {
-    eprintln!("effigy: no rows about a graphics card: built without the feature `gpu-drive`");
-    Ok(Vec::new())
 }
 
 /// Somebody's movement, pose by pose, over and over.

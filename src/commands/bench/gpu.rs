@@ -10,19 +10,50 @@ use effigy_capture::FrameId;
 use effigy_registration::BodyParams;
 
 use super::{Row, in_turn::in_turn};
+use crate::interrupt;
 
 /// What is asked of a card; and of one in software, which takes a hundred times as long.
 const COMPARED: usize = 30;
 const ROUNDS: usize = 600;
 const IN_SOFTWARE: usize = 3;
 
-/// On this machine's fastest adapter; one in software is measured too, and says so in its rows.
-pub(super) fn open() -> Result<Arc<Gpu>, GpuError> {
-    Gpu::of_this_machine().map(Arc::new)
+/// Frames between two poses that are compared.
+const FRAMES_APART: usize = 37;
+
+/// On this machine's fastest adapter, with the avatar's own vertices and with more than three times as many; an adapter in
+/// software is measured too, and says so in its rows.
+pub(super) fn rows(
+    own: &Arc<Avatar>,
+    fine: impl FnOnce() -> anyhow::Result<Arc<Avatar>>,
+    params: &dyn Fn(usize) -> BodyParams,
+    quick: bool,
+) -> anyhow::Result<Vec<Row>> {
+    let gpu = match Gpu::of_this_machine() {
+        Ok(gpu) => Arc::new(gpu),
+        Err(reason) => {
+            eprintln!("effigy: no rows about a graphics card: {reason}");
+            return Ok(Vec::new());
+        }
+    };
+    let mut avatars = vec![Arc::clone(own)];
+    if !quick {
+        avatars.push(fine()?);
+    }
+    let mut rows = Vec::new();
+    for avatar in avatars {
+        if interrupt::requested() {
+            break;
+        }
+        match rows_of(&gpu, &avatar, params, quick) {
+            Ok(more) => rows.extend(more),
+            Err(reason) => eprintln!("effigy: no more rows about a graphics card: {reason}"),
+        }
+    }
+    Ok(rows)
 }
 
 /// One avatar in poses that `params` numbers.
-pub(super) fn rows(
+fn rows_of(
     gpu: &Arc<Gpu>,
     avatar: &Arc<Avatar>,
     params: &dyn Fn(usize) -> BodyParams,
@@ -38,7 +69,7 @@ pub(super) fn rows(
         (false, false) => (COMPARED, ROUNDS),
     };
     for number in 0..compared {
-        let params = params(number * 37);
+        let params = params(number * FRAMES_APART);
         let ours = card.pose(&params, FrameId(0))?.vertices;
         let twins = cpu.pose(&params, FrameId(0)).vertices;
         let pairs = ours.iter().zip(&twins);
