@@ -75,7 +75,7 @@ fn random_avatar(field: SirenConfig) -> Avatar {
 /// Single precision, summed in another order, comes to 0.0003 mm; compilers may round otherwise.
 const MOST_P99_MM: f32 = 0.005;
 
-/// A step that ends beside the settled length may be the last one on one side only: a tenth of 3 mm is left to it then.
+/// A step that ends beside the settled length may be the last one on one side only: a tenth of 3 mm is left to it as a rule.
 const MOST_MM: f32 = 0.4;
 
 /// Edges of some 30 mm turn by less, where their ends are as near to the twin's as asked for.
