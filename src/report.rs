@@ -26,6 +26,8 @@ pub(crate) struct Report {
     pub(crate) avatars: usize,
     /// Of the avatar that was driven last.
     pub(crate) fine_tune: Option<FineTuneFigures>,
+    /// Of what was driven last.
+    pub(crate) drive: Option<DriveFigures>,
     pub(crate) time_to_first_avatar_secs: Option<f64>,
     pub(crate) preview: Option<PreviewScores>,
     pub(crate) latency_ms: Option<Latency>,
@@ -60,6 +62,15 @@ pub(crate) struct FineTuneFigures {
     pub(crate) held_out_mm: f32,
     /// `None` where the drive evaluates the full field.
     pub(crate) map_p95_mm: Option<f32>,
+}
+
+/// What posed the avatar.
+#[derive(Clone, Debug, Serialize)]
+pub(crate) struct DriveFigures {
+    /// "CPU, map"; "AMD Radeon RX 7600, full field".
+    pub(crate) device: String,
+    /// Why a graphics card that was at hand does not.
+    pub(crate) gave_up: Option<String>,
 }
 
 /// What was shown before the first avatar.
@@ -144,6 +155,12 @@ impl fmt::Display for Report {
                 "fine-tuning {} steps in {:.1} s, {:.1} mm held out; {} avatars made",
                 tune.steps, tune.seconds, tune.held_out_mm, self.avatars
             )?;
+        }
+        if let Some(DriveFigures { device, gave_up }) = &self.drive {
+            writeln!(f, "driven by   {device}")?;
+            if let Some(reason) = gave_up {
+                writeln!(f, "            no graphics card: {reason}")?;
+            }
         }
         if let Some(body) = &self.body {
             writeln!(

@@ -158,6 +158,10 @@ impl Driver {
         &self.avatar
     }
 
+    pub(crate) fn has_map(&self) -> bool {
+        self.map.is_some()
+    }
+
     /// The avatar in the pose of `params`; the shape is the avatar's own, whatever `params.betas` say.
     pub fn pose(&mut self, params: &BodyParams, frame: FrameId) -> AvatarMesh {
         let pose = self.avatar.subject.pose_input(&params.theta);
@@ -275,6 +279,22 @@ impl Driver {
                     .transform_point3(at_rest)
             })
             .collect()
+    }
+}
+
+/// What the twin on a graphics card starts from.
+#[cfg(feature = "gpu")]
+impl Driver {
+    pub(crate) fn config(&self) -> &DriveConfig {
+        &self.config
+    }
+
+    pub(crate) fn slopes(&self) -> &[f32] {
+        &self.slopes
+    }
+
+    pub(crate) fn rest_from_canonical(&self) -> &[Affine3A] {
+        &self.rest_from_canonical
     }
 }
 

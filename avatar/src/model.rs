@@ -17,7 +17,7 @@ use crate::{
     mesher,
     neighbors::Neighbors,
     pose_input::PoseInput,
-    sdf::SignedDistanceField,
+    sdf::{SignedDistanceField, SirenField},
     skinning::{BoneWeights, Skinning, average, four_largest, rest_from_canonical, star_body},
 };
 
@@ -28,6 +28,11 @@ pub trait PoseField: Send + Sync + Any {
 
     /// The few numbers through which alone the pose enters the field's parameters, if there are such.
     fn coefficients(&self, _pose: &PoseInput) -> Option<Vec<f32>> {
+        None
+    }
+
+    /// The field of one pose with its parameters, if it is a SIREN.
+    fn siren(&self, _pose: &PoseInput) -> Option<SirenField> {
         None
     }
 

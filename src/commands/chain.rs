@@ -18,6 +18,7 @@ use crate::{
         avatar_stage::AvatarStage,
         clock::{Clock, percentile},
         controls::Controls,
+        drive_device::DriveDevice,
         evaluate::evaluate,
         lock_step,
         outputs::Outputs,
@@ -28,7 +29,10 @@ use crate::{
         schedule::Schedule,
         settings::Settings,
     },
-    report::{FineTuneFigures, FrameCounts, Latency, PreviewScores, Report, SCHEMA, SurfaceScores},
+    report::{
+        DriveFigures, FineTuneFigures, FrameCounts, Latency, PreviewScores, Report, SCHEMA,
+        SurfaceScores,
+    },
     say::say,
 };
 
@@ -116,6 +120,11 @@ pub(crate) fn report_of(
     let calibration = input.source.calibration().clone();
     // A window is closed when somebody closes it.
     let frame_count = input.source.frame_count().filter(|_| window.is_none());
+    let schedule = match input.pace {
+        Pace::LockStep => input.decided.take().unwrap_or(Schedule::AfterFrames),
+        Pace::RealTime => Schedule::WhenReady,
+    };
+    let device = DriveDevice::choose(settings.drive.device, &schedule, window.as_deref())?;
     let mut outputs = Outputs::new(args, &calibration, frame_count, &body)?;
     if let Some(slot) = window {
         outputs.publish(Publisher::new(
@@ -138,12 +147,8 @@ pub(crate) fn report_of(
         let recorder = Recorder::create(path, &calibration, &input.metadata, when_slow)?;
         outputs.record_to(recorder);
     }
-    let schedule = match input.pace {
-        Pace::LockStep => input.decided.unwrap_or(Schedule::AfterFrames),
-        Pace::RealTime => Schedule::WhenReady,
-    };
     let depth = calibration.depth;
-    let mut avatar = AvatarStage::new(Arc::clone(&body), depth, &settings, schedule, clock);
+    let mut avatar = AvatarStage::new(Arc::clone(&body), depth, &settings, device, schedule, clock);
     let stages = (&mut avatar, &mut outputs);
     let log = match input.pace {
         Pace::LockStep => lock_step::run(&mut *input.source, &body, &settings, stages, clock)?,
@@ -163,6 +168,10 @@ pub(crate) fn report_of(
         (&avatar, &settings.canonicalise),
         input.truth.as_ref(),
     )?;
+    report.drive = avatar.driver().map(|driver| DriveFigures {
+        device: driver.device(),
+        gave_up: driver.gave_up().map(str::to_owned),
+    });
     report.seconds_total = clock.secs();
     report.peak_memory_mb = peak_memory_mb();
     report.write(&args.out.join("report.json"))?;
@@ -207,6 +216,7 @@ fn report(source: String, log: &RunLog) -> Report {
             held_out_mm: job.held_out_mm,
             map_p95_mm: job.map_p95_mm,
         }),
+        drive: None,
         time_to_first_avatar_secs: log.jobs.first().map(|job| job.total_secs),
         preview: log.preview.map(|preview| PreviewScores {
             secs: preview.secs,

@@ -4,7 +4,7 @@ use std::{collections::BTreeSet, sync::Arc};
 
 use crossbeam::channel::Sender;
 use effigy_avatar::{
-    Avatar, AvatarMesh, Driver, KeyframeSelector, fine_tune::FineTuneProgress,
+    Avatar, AvatarMesh, KeyframeSelector, LiveDriver, fine_tune::FineTuneProgress,
     skinning::offsets_from_body,
 };
 use effigy_capture::{CameraModel, FrameId};
@@ -13,6 +13,7 @@ use effigy_registration::{BodyModel, RegisteredFrame, SmoothConfig, Smoother};
 use super::{
     avatar_job::{AvatarJob, Beside, FinishedAvatar, JobFigures, Preview, PreviewFigures},
     clock::{Clock, Timings},
+    drive_device::DriveDevice,
     schedule::{Decision, Schedule},
     settings::Settings,
     track_stage::{Followed, Handover},
@@ -22,6 +23,7 @@ pub(crate) struct AvatarStage {
     body: Arc<BodyModel>,
     camera: CameraModel,
     settings: Settings,
+    device: DriveDevice,
     schedule: Schedule,
     clock: Clock,
     selector: KeyframeSelector,
@@ -51,7 +53,7 @@ struct Making {
 }
 
 struct Made {
-    driver: Driver,
+    driver: LiveDriver,
     /// Driven until the avatar itself is there.
     is_preview: bool,
     frames_driven: u64,
@@ -63,6 +65,7 @@ impl AvatarStage {
         body: Arc<BodyModel>,
         camera: CameraModel,
         settings: &Settings,
+        device: DriveDevice,
         schedule: Schedule,
         clock: Clock,
     ) -> Self {
@@ -70,6 +73,7 @@ impl AvatarStage {
             body,
             camera,
             settings: settings.clone(),
+            device,
             schedule,
             clock,
             selector: KeyframeSelector::new(settings.keyframes.clone()),
@@ -189,6 +193,11 @@ impl AvatarStage {
 
     pub(crate) fn avatar(&self) -> Option<&Arc<Avatar>> {
         self.made.as_ref().map(|made| made.driver.avatar())
+    }
+
+    /// What drives, if there is anything to drive.
+    pub(crate) fn driver(&self) -> Option<&LiveDriver> {
+        self.made.as_ref().map(|made| &made.driver)
     }
 
     /// What was driven before the first avatar, and what it took.
@@ -332,6 +341,7 @@ impl AvatarStage {
             let keyframes = making.keyframes.clone();
             self.learned_from.extend(&keyframes);
             self.preview = Some((Arc::clone(driver.avatar()), figures));
+            let driver = self.device.driver(driver, &self.clock);
             self.made = Some(Made { driver, is_preview: true, frames_driven: 0, keyframes });
         }
     }
@@ -348,6 +358,7 @@ impl AvatarStage {
         let FinishedAvatar { driver, figures } = finished?;
         self.learned_from.extend(&keyframes);
         self.figures.push(figures);
+        let driver = self.device.driver(driver, &self.clock);
         self.made = Some(Made { driver, is_preview: false, frames_driven: 0, keyframes });
         Ok(())
     }

@@ -4,7 +4,10 @@ pub(crate) mod avatar_job;
 pub(crate) mod avatar_stage;
 pub(crate) mod clock;
 pub(crate) mod controls;
+pub(crate) mod drive_device;
 pub(crate) mod evaluate;
+#[cfg_attr(not(feature = "gpu-drive"), path = "no_graphics_card.rs")]
+mod graphics_card;
 pub(crate) mod lock_step;
 pub(crate) mod outputs;
 pub(crate) mod pictures;

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use effigy_avatar::AvatarMesh;
+use effigy_avatar::{AvatarMesh, LiveDriver};
 use effigy_capture::{Calibration, Frame, Timestamp};
 use effigy_registration::{BodyModel, RegisteredFrame, Tracking, smpl::Poser};
 use effigy_viewer::{
@@ -25,6 +25,9 @@ const FIGURES_EVERY: u64 = 15;
 
 pub(crate) struct Publisher {
     slot: Arc<SnapshotSlot>,
+    source: String,
+    /// What drives, as it was last told.
+    drive: Option<String>,
     poser: Poser,
     triangles: Arc<Vec<[u32; 3]>>,
     no_colors: Arc<Vec<[u8; 3]>>,
@@ -42,13 +45,15 @@ impl Publisher {
         body: &Arc<BodyModel>,
         clock: Clock,
     ) -> Self {
-        let device = format!("CPU, {} threads", Machine::this().threads);
+        let source_view = source_view(&source, None);
         slot.update(|snapshot| {
-            snapshot.source = Arc::new(SourceView { name: source, device });
+            snapshot.source = Arc::new(source_view);
             snapshot.calibration = Some(Arc::new(calibration.clone()));
         });
         Self {
             slot,
+            source,
+            drive: None,
             poser: Poser::new(Arc::clone(body)),
             triangles: Arc::new(body.triangles.clone()),
             no_colors: Arc::default(),
@@ -81,6 +86,7 @@ impl Publisher {
             wanted: avatar.keyframes_wanted(),
             hint: "turn slowly".to_owned(),
         });
+        self.tell_drive(avatar);
         let training = self.training(avatar);
         let performance = self.performance(avatar, log);
         self.slot.update(|snapshot| {
@@ -114,6 +120,20 @@ impl Publisher {
             snapshot.avatar = Some(view);
             snapshot.training = training;
         });
+    }
+
+    /// Says what drives when that changes, and why a graphics card does not any more.
+    fn tell_drive(&mut self, avatar: &AvatarStage) {
+        let drive = avatar.driver().map(LiveDriver::device);
+        if drive == self.drive {
+            return;
+        }
+        let view = Arc::new(source_view(&self.source, drive.as_deref()));
+        self.slot.update(|snapshot| snapshot.source = view);
+        if let Some(reason) = avatar.driver().and_then(LiveDriver::gave_up) {
+            self.say(&format!("driving without the graphics card: {reason}"));
+        }
+        self.drive = drive;
     }
 
     fn avatar_view(&self, mesh: &AvatarMesh) -> Arc<AvatarView> {
@@ -208,6 +228,13 @@ impl Publisher {
             drops: drops.into_iter().collect(),
         })
     }
+}
+
+fn source_view(source: &str, drive: Option<&str>) -> SourceView {
+    let threads = Machine::this().threads;
+    let drive = drive.map(|drive| format!("; drive: {drive}"));
+    let device = format!("CPU, {threads} threads{}", drive.unwrap_or_default());
+    SourceView { name: source.to_owned(), device }
 }
 
 fn state(tracking: &Tracking, now: Timestamp, log: &RunLog) -> TrackState {

@@ -17,7 +17,7 @@ use effigy_fusion::clean::CleanConfig;
 use effigy_registration::{SmoothConfig, smpl::BodyIdentity, track::TrackConfig};
 use serde::{Deserialize, Serialize};
 
-use super::refine::RefineConfig;
+use super::{drive_device::DriveSettings, refine::RefineConfig};
 use crate::files;
 
 /// More would not be few shots any more, and fill the memory.
@@ -43,6 +43,8 @@ pub(crate) struct Settings {
     pub(crate) fine_tune: FineTuneConfig,
     /// How an avatar's shape is learned as a function of the pose, so that the drive need not evaluate its field.
     pub(crate) map: MapConfig,
+    /// What poses the avatar once there is one.
+    pub(crate) drive: DriveSettings,
     pub(crate) preview: PreviewConfig,
     pub(crate) schedule: ScheduleConfig,
 }

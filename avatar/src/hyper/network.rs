@@ -407,6 +407,10 @@ impl PoseField for HyperNetwork {
         (!coefficients.is_empty()).then_some(coefficients)
     }
 
+    fn siren(&self, pose: &PoseInput) -> Option<SirenField> {
+        Some(Self::field(self, pose))
+    }
+
     fn kind(&self) -> &str {
         Self::KIND
     }

@@ -20,12 +20,15 @@ use effigy_registration::{
 };
 use glam::Vec3;
 
-use super::{Row, in_turn::in_turn};
+use super::{Row, gpu, in_turn::in_turn};
 use crate::pipeline::avatar_job::map_motions;
 
 /// MetaAvatar's grid, and one that a dense evaluation can afford here.
 const RESOLUTION: usize = 256;
 const DENSE_RESOLUTION: usize = 128;
+
+/// Where a graphics card has more to do than a pose's overhead.
+const FINE_VERTICES: usize = 25_000;
 
 pub(super) fn rows(quick: bool) -> anyhow::Result<Vec<Row>> {
     let body = builtin::body();
@@ -34,10 +37,18 @@ pub(super) fn rows(quick: bool) -> anyhow::Result<Vec<Row>> {
     let network = Arc::new(hyper::prior());
     let skinning = ClosestBodyPoint::new(body, &subject.betas, ClosestBodyPointConfig::default());
     let theta = Routine::Stand.motion(&rest, 30.0, 1).poses[0].theta;
-    let topology = TopologyConfig::default();
-    let field = Arc::clone(&network);
-    let avatar = Arc::new(Avatar::new(&subject, field, &skinning, &theta, &topology)?);
-    let mut rows = poses(&avatar, &rest, if quick { 30 } else { 600 })?;
+    let avatar = |topology: TopologyConfig| {
+        let field = Arc::clone(&network);
+        let avatar = Avatar::new(&subject, field, &skinning, &theta, &topology)?;
+        anyhow::Ok(Arc::new(avatar))
+    };
+    let own = avatar(TopologyConfig::default())?;
+    let mut rows = poses(&own, &rest, if quick { 30 } else { 600 })?;
+    let fine = || {
+        let topology = TopologyConfig { vertices: FINE_VERTICES, ..TopologyConfig::default() };
+        avatar(topology)
+    };
+    rows.extend(gpu::rows(&own, fine, &params_of(&rest), quick)?);
     let sdf = network.field(&subject.pose_input(&theta));
     rows.extend(meshes(&sdf, if quick { 64 } else { RESOLUTION }, quick));
     Ok(rows)
@@ -56,11 +67,7 @@ fn poses(avatar: &Arc<Avatar>, rest: &RestBody, count: usize) -> anyhow::Result<
     .context("the prior has coefficients")?;
     let error = map.error;
     let mut mapped = new().with_map(map);
-    let motion = Routine::Mixture.motion(rest, 30.0, 1);
-    let params = |number: usize| {
-        let pose = &motion.poses[number % motion.poses.len()];
-        BodyParams { betas: avatar.subject.betas, theta: pose.theta, trans: pose.trans }
-    };
+    let params = params_of(rest);
     let (mut a, mut b) = (0, 0);
     let [by_field, by_map] = in_turn(
         count,
@@ -87,6 +94,15 @@ fn poses(avatar: &Arc<Avatar>, rest: &RestBody, count: usize) -> anyhow::Result<
         ),
         Row::new("vertices driven", vertices as f64, ""),
     ])
+}
+
+/// Somebody's movement, pose by pose, over and over.
+fn params_of(rest: &RestBody) -> impl Fn(usize) -> BodyParams + use<> {
+    let motion = Routine::Mixture.motion(rest, 30.0, 1);
+    move |number: usize| {
+        let pose = &motion.poses[number % motion.poses.len()];
+        BodyParams { betas: [0.0; 10], theta: pose.theta, trans: pose.trans }
+    }
 }
 
 /// Following the surface against asking the whole grid.

@@ -4,6 +4,8 @@ mod chain;
 mod drive;
 mod field;
 mod fusion;
+#[cfg_attr(not(feature = "gpu-drive"), path = "no_gpu.rs")]
+mod gpu;
 mod in_turn;
 
 use std::fmt::Write as _;
@@ -64,7 +66,7 @@ struct Results {
     schema: &'static str,
     version: &'static str,
     machine: Machine,
-    /// Everything here runs on the processor.
+    /// Everything runs on the processor but what names an adapter.
     device: &'static str,
     quick: bool,
     rows: Vec<Row>,
@@ -109,11 +111,15 @@ pub(crate) fn run(args: &BenchArgs) -> anyhow::Result<()> {
 fn table(machine: &Machine, rows: &[Row]) -> String {
     let cpu = machine.cpu.as_deref().unwrap_or(machine.arch);
     let mut text = format!(
-        "{cpu}, {} threads, no GPU used\n\n| what | value | | ratio |\n|---|---|---|---|\n",
+        "{cpu}, {} threads; everything runs on the processor but what names an adapter\n\n| what | value | | ratio |\n|---|---|---|---|\n",
         machine.threads
     );
     for Row { name, value, unit, ratio, compared_with } in rows {
-        let digits = if *value >= 100.0 { 0 } else { 2 };
+        let digits = match *value {
+            100.0.. => 0,
+            value if value > 0.0 && value < 0.01 => 5,
+            _ => 2,
+        };
         let against = match (ratio, compared_with) {
             (Some(ratio), Some(with)) => format!("{ratio:.2} x {with}"),
             _ => String::new(),

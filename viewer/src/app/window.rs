@@ -55,6 +55,8 @@ impl Window {
         theme::apply(&creation.egui_ctx);
         let info = state.adapter.get_info();
         let software = info.device_type == wgpu::DeviceType::Cpu;
+        // Whoever waits for the window then finds its adapter, too.
+        slot.set_adapter(state.adapter.clone());
         wake_on_news(&slot, &creation.egui_ctx, software);
         let desk = Desk {
             commands,

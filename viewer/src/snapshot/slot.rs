@@ -5,6 +5,9 @@ use std::{
     sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError},
 };
 
+#[cfg(feature = "window")]
+use eframe::wgpu;
+
 use super::Snapshot;
 
 /// Holds one snapshot; writers never wait for the reader to draw.
@@ -12,6 +15,8 @@ use super::Snapshot;
 pub struct SnapshotSlot {
     latest: Mutex<Arc<Snapshot>>,
     waker: OnceLock<Box<dyn Fn() + Send + Sync>>,
+    #[cfg(feature = "window")]
+    adapter: OnceLock<wgpu::Adapter>,
 }
 
 impl SnapshotSlot {
@@ -44,6 +49,17 @@ impl SnapshotSlot {
     /// Whether a window shows what comes in.
     pub fn is_watched(&self) -> bool {
         self.waker.get().is_some()
+    }
+
+    /// What draws the window: the pipeline may compute on it, with a device of its own.
+    #[cfg(feature = "window")]
+    pub fn adapter(&self) -> Option<&wgpu::Adapter> {
+        self.adapter.get()
+    }
+
+    #[cfg(feature = "window")]
+    pub(crate) fn set_adapter(&self, adapter: wgpu::Adapter) {
+        self.adapter.get_or_init(|| adapter);
     }
 
     fn wake(&self) {

@@ -1,0 +1,15 @@
+// Twin of `sdf/sincos.rs`, where its sources are: WGSL promises of its own sine no more than 2^-11.
+
+fn sine(angle_rad: vec4f) -> vec4f {
+    let turns = round(angle_rad * 0.318309886);
+    var r = fma(-turns, vec4f(3.140625), angle_rad);
+    r = fma(-turns, vec4f(9.675026e-4), r);
+    r = fma(-turns, vec4f(1.509958e-7), r);
+    let r2 = r * r;
+    var p = fma(vec4f(2.6000243e-6), r2, vec4f(-1.9806602e-4));
+    p = fma(p, r2, vec4f(8.333017e-3));
+    p = fma(p, r2, vec4f(-0.16666657));
+    let s = fma(p * r2, r, r);
+    let odd = turns - 2.0 * floor(0.5 * turns);
+    return s * (1.0 - 2.0 * odd);
+}
