@@ -94,7 +94,7 @@ impl Default for EnergyConfig {
             reach_m: 0.12,
             direction_m: 0.08,
             oblique: 0.3,
-            contradiction_weight: 400.0,
+            contradiction_weight: 150.0,
             contradiction_m: 0.02,
             silhouette_slack_m: 0.012,
             pose_prior_weight: 1.0,
@@ -154,8 +154,8 @@ pub(crate) struct Effort {
     pub(crate) every: usize,
     /// Self-occlusion by drawing, or only by facing.
     pub(crate) drawn_visibility: bool,
-    /// Factor on the outlier scale in the first round and in the last.
-    pub(crate) widen: [f32; 2],
+    /// Factor on the outlier scale in the first round; it falls to one in the last.
+    pub(crate) widen: f32,
     /// From this share of the rounds on a step that gains nothing ends the alignment.
     pub(crate) settled_from: f32,
 }
@@ -235,8 +235,7 @@ pub(crate) fn align(
             };
         }
         let progress = rounds as f32 / (effort.rounds - 1).max(1) as f32;
-        let [first, last] = effort.widen;
-        evidence.widen = first + (last - first) * progress;
+        evidence.widen = effort.widen + (1.0 - effort.widen) * progress;
         evidence.gather(&body, &visibility, observation, &points, context);
         for _ in 0..effort.steps {
             let outcome = evidence.with_terms(observation, context, |terms| {

@@ -65,7 +65,7 @@ impl Searcher<'_> {
         let coarse = Effort { rounds: self.config.coarse_rounds, ..COARSE };
         let mut found = self.refine(&hypotheses, self.coarse, sight.coarse, &coarse);
         found.truncate(self.config.keep);
-        let middle = Effort { rounds: self.config.middle_rounds, widen: [2.0, 1.0], ..COARSE };
+        let middle = Effort { rounds: self.config.middle_rounds, widen: 2.0, ..COARSE };
         let mut found = self.refine(&states(&found), self.coarse, sight.coarse, &middle);
         keep_different(&mut found, self.config.finalists);
         let last = Effort {
@@ -73,19 +73,10 @@ impl Searcher<'_> {
             steps: 1,
             every: 2,
             drawn_visibility: true,
-            widen: [1.5, 1.0],
+            widen: 1.5,
             settled_from: 0.5,
         };
-        /// Some show that they are not it before they are aligned to the end.
-        const LEFT_HALF_WAY: f32 = 0.5;
-        let [wide, narrow] = last.widen;
-        let half_way = f32::midpoint(wide, narrow);
-        let rounds = last.rounds.div_ceil(2);
-        let first = Effort { rounds, widen: [wide, half_way], ..last };
-        let mut found = self.refine(&states(&found), self.fine, sight.fine, &first);
-        found.truncate((self.config.finalists as f32 * LEFT_HALF_WAY).ceil() as usize);
-        let rest = Effort { rounds: last.rounds - rounds, widen: [half_way, narrow], ..last };
-        let mut found = self.refine(&states(&found), self.fine, sight.fine, &rest);
+        let mut found = self.refine(&states(&found), self.fine, sight.fine, &last);
         // A template's raised arm may have hidden behind the body: unseen limbs are as people hold them.
         let relaxed: Vec<BodyState> = found.iter().filter_map(with_unseen_arms_at_rest).collect();
         found.extend(self.refine(&relaxed, self.fine, sight.fine, &last));
@@ -161,7 +152,7 @@ pub(crate) const COARSE: Effort = Effort {
     steps: 1,
     every: 1,
     drawn_visibility: false,
-    widen: [3.0, 1.0],
+    widen: 3.0,
     settled_from: 1.0,
 };
 

@@ -21,14 +21,14 @@ pub(crate) fn recover_arms(
     for arm in [LEFT, RIGHT] {
         candidates = best_arms(searcher, sight.coarse, &candidates, &arm);
     }
-    let coarse = Effort { rounds: 4, widen: [2.0, 1.0], ..COARSE };
+    let coarse = Effort { rounds: 4, widen: 2.0, ..COARSE };
     let nearer = searcher.refine(&candidates, searcher.coarse, sight.coarse, &coarse);
     let fine = Effort {
         rounds: 6,
         steps: 1,
         every: 1,
         drawn_visibility: true,
-        widen: [1.5, 1.0],
+        widen: 1.5,
         settled_from: 0.5,
     };
     let starts: Vec<BodyState> = nearer.iter().take(FINALISTS).map(|a| a.state).collect();

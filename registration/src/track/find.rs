@@ -90,7 +90,7 @@ impl Tracker {
             steps: self.config.steps,
             every: 1,
             drawn_visibility: true,
-            widen: [1.0, 1.0],
+            widen: 1.0,
             settled_from: 0.3,
         };
         for aligned in found.iter_mut() {

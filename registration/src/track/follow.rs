@@ -105,7 +105,7 @@ impl Tracker {
             steps: self.config.steps,
             every: 1,
             drawn_visibility: true,
-            widen: [2.0, 1.0],
+            widen: 2.0,
             settled_from: 0.3,
         };
         align(

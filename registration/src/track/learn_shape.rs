@@ -52,7 +52,7 @@ impl Tracker {
                 steps: self.config.steps,
                 every: 2,
                 drawn_visibility: true,
-                widen: [1.0, 1.0],
+                widen: 1.0,
                 settled_from: 0.3,
             };
             let settled = align(&self.shaped, &body.state, observation, &context, &effort);

@@ -69,7 +69,7 @@ impl Refiner {
             steps: self.config.steps,
             every: 1,
             drawn_visibility: true,
-            widen: [1.0, 1.0],
+            widen: 1.0,
             settled_from: 0.5,
         };
         let start = BodyState::from_params(params);
