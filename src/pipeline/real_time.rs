@@ -34,10 +34,10 @@ use crate::interrupt;
 /// One frame waits while one is worked on; anything longer is latency.
 const QUEUE: usize = 1;
 
-/// While somebody is looked for, half a second of frames waits: they are recorded and shown a little late, not lost.
+/// While somebody is looked for, half a second of frames (at 30 a second) waits: they are recorded and shown a little late, not lost.
 const QUEUE_WHILE_LOST: usize = 15;
 /// Once somebody is found, so much of a place in the queue goes with each new frame: a machine that catches up loses no
-/// frame, and one that does not is current again within two seconds.
+/// frame, and one that does not is current again after 50.
 const CATCHING_UP: f32 = 0.3;
 
 /// Commands are looked at this often while no frame comes.
@@ -162,6 +162,10 @@ fn capture(
         if steered.waited || steered.jumped {
             pacer.restart();
         }
+        if steered.jumped {
+            // Nobody wants to see any more what was before.
+            waiting.try_iter().for_each(drop);
+        }
         let Some(frame) = source.next_frame()? else {
             break;
         };
@@ -222,6 +226,9 @@ fn clean(
     to_track: &Sender<Cleaned>,
 ) -> anyhow::Result<()> {
     for delivered in frames {
+        if interrupt::requested() {
+            break;
+        }
         let cleaned = cleaning.process(&delivered.frame)?;
         if to_track.send(Cleaned { delivered, cleaned }).is_err() {
             break;
@@ -241,10 +248,12 @@ fn track(
         if delivered.jumps != jumps {
             jumps = delivered.jumps;
             tracking.jumped();
+            lost.store(true, Ordering::Relaxed);
         }
         let tracked = tracking.process(cleaned);
-        let is_lost = matches!(tracked.registered.tracking, Tracking::Lost { .. });
-        lost.store(is_lost, Ordering::Relaxed);
+        // Whoever is seen in part is still looked for.
+        let is_tracked = matches!(tracked.registered.tracking, Tracking::Tracked { .. });
+        lost.store(!is_tracked, Ordering::Relaxed);
         if to_drive.send(Tracked { delivered, tracked }).is_err() {
             break;
         }

@@ -94,6 +94,11 @@ impl Gpu {
         self.first_fault.get().cloned().map_or(Ok(()), Err)
     }
 
+    /// Whoever asks from now on is told this, if nothing went wrong before.
+    pub(super) fn remember(&self, fault: &GpuError) {
+        self.first_fault.get_or_init(|| fault.clone());
+    }
+
     pub(super) fn failed(&self, why: &impl fmt::Display) -> GpuError {
         GpuError::Failed { adapter: self.name.clone(), why: on_one_line(why) }
     }

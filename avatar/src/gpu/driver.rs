@@ -88,8 +88,13 @@ impl GpuDriver {
         &self.gpu
     }
 
-    /// As [`Driver::pose`]; after an error this driver is of no use any more.
+    /// As [`Driver::pose`]; after an error neither this driver nor its device is of any use any more.
     pub fn pose(&mut self, params: &BodyParams, frame: FrameId) -> Result<AvatarMesh, GpuError> {
+        self.posed(params, frame)
+            .inspect_err(|error| self.gpu.remember(error))
+    }
+
+    fn posed(&mut self, params: &BodyParams, frame: FrameId) -> Result<AvatarMesh, GpuError> {
         self.upload(params)?;
         let submission = self.dispatch();
         let [canonical, vertices, normals] = self.download(submission)?;

@@ -56,6 +56,7 @@ fn rows_of(report: &Report) -> Vec<Row> {
     );
     for stage in ["clean", "track", "drive"] {
         let times = report.stages_ms.get(stage);
+        let stage = stage_name(stage, report);
         add(&format!("{stage}, p50"), times.map(|of| of.p50), "ms");
         add(&format!("{stage}, p95"), times.map(|of| of.p95), "ms");
     }
@@ -86,4 +87,14 @@ fn rows_of(report: &Report) -> Vec<Row> {
         }
     }
     rows
+}
+
+/// A drive on a graphics card names it.
+fn stage_name(stage: &str, report: &Report) -> String {
+    match &report.drive {
+        Some(drive) if stage == "drive" && !drive.device.starts_with("CPU") => {
+            format!("drive on {}", drive.device)
+        }
+        _ => stage.to_owned(),
+    }
 }
