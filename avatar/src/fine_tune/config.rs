@@ -45,7 +45,7 @@ impl Default for FineTuneConfig {
             steps: 150,
             code_steps: 75,
             code_rates: RateConfig::of_code(),
-            doubt_m: 0.0,
+            doubt_m: 0.02,
             frames_per_step: 0,
             warm_up_steps: 10,
             decay_share: 0.5,
