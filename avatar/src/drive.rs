@@ -166,9 +166,12 @@ impl Driver {
     pub fn pose(&mut self, params: &BodyParams, frame: FrameId) -> AvatarMesh {
         let pose = self.avatar.subject.pose_input(&params.theta);
         if !self.place_by_map(&pose) {
-            let sdf = self.avatar.field.field(&pose);
-            self.project(&*sdf);
+            self.place_by_field(&pose);
         }
+        self.posed(params, frame)
+    }
+
+    fn posed(&self, params: &BodyParams, frame: FrameId) -> AvatarMesh {
         let unit_box = self.avatar.subject.unit_box;
         let canonical: Vec<Vec3> = self
             .points
@@ -201,6 +204,12 @@ impl Driver {
         self.points.clear();
         self.points.extend(places.zip(&self.offsets).map(offset));
         true
+    }
+
+    /// Leaves the vertices in `self.points`.
+    fn place_by_field(&mut self, pose: &PoseInput) {
+        let sdf = self.avatar.field.field(pose);
+        self.project(&*sdf);
     }
 
     /// How far each vertex lies along its topology normal from its topology place in a pose, metres; found in the full
@@ -282,9 +291,15 @@ impl Driver {
     }
 }
 
-/// What the twin on a graphics card starts from.
+/// What the twin on a graphics card starts from, and is compared with.
 #[cfg(feature = "gpu")]
 impl Driver {
+    /// As [`Self::pose`], without the map.
+    pub(crate) fn pose_in_full_field(&mut self, params: &BodyParams, frame: FrameId) -> AvatarMesh {
+        self.place_by_field(&self.avatar.subject.pose_input(&params.theta));
+        self.posed(params, frame)
+    }
+
     pub(crate) fn config(&self) -> &DriveConfig {
         &self.config
     }

@@ -58,8 +58,8 @@ impl LiveDriver {
         self.cpu.pose(params, frame)
     }
 
-    /// How far the device's vertices are from the processor's in a pose, metres: 95 of 100 are nearer, and all have a
-    /// place (else it is infinite). `None` if no device drives, or it fails and is given up.
+    /// How far the device's vertices are from the processor's in a pose, both in the full field, metres: 95 of 100 are
+    /// nearer, and all have a place (else it is infinite). `None` if no device drives, or it fails and is given up.
     #[cfg(feature = "gpu")]
     pub fn off_the_processor_m(&mut self, params: &BodyParams) -> Option<f32> {
         let of_device = match self.gpu.as_mut()?.pose(params, FrameId(0)) {
@@ -69,7 +69,7 @@ impl LiveDriver {
                 return None;
             }
         };
-        let of_processor = self.cpu.pose(params, FrameId(0));
+        let of_processor = self.cpu.pose_in_full_field(params, FrameId(0));
         let pairs = of_device.vertices.iter().zip(&of_processor.vertices);
         let mut off_m: Vec<f32> = pairs.map(|(a, b)| a.distance(*b)).collect();
         off_m.sort_by(f32::total_cmp);

@@ -36,7 +36,7 @@ const TRIED: u64 = 5;
 /// A trial goes on for no longer: frames wait.
 const LONGEST_TRIAL_SECS: f64 = 0.1;
 
-/// A card whose vertices are farther from the processor's (p95; a map's are 0.4 mm off) computes something else.
+/// A card whose vertices are farther from the processor's (p95) computes something else.
 const FARTHEST_M: f32 = 0.005;
 
 impl GraphicsCard {

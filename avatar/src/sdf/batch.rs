@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use super::{
     config::SirenConfig,
     field::SpareWorkspaces,
-    kernel::{self, Network, Workspace, tile_points},
+    kernel::{self, Network, Workspace},
     loss::{LossConfig, LossPoint, LossTerms, Scale, point_loss},
 };
 
@@ -57,7 +57,6 @@ impl FieldGradients {
             .map(|frame| Network::new(self.config, frame.parameters))
             .collect();
         let (config, spare) = (self.config, &self.spare);
-        let tile = tile_points(config);
         self.units
             .par_iter_mut()
             .enumerate()
@@ -72,7 +71,7 @@ impl FieldGradients {
                         work,
                         &nets[frame],
                         &frames[frame],
-                        (part, tile),
+                        part,
                         (loss, scale),
                         unit,
                     );
@@ -98,10 +97,11 @@ fn run_unit(
     work: &mut Workspace,
     net: &Network<'_>,
     frame: &FieldFrame<'_>,
-    (part, tile): (usize, usize),
+    part: usize,
     (loss, scale): (&LossConfig, Scale),
     unit: &mut Unit,
 ) {
+    let tile = work.tile_points();
     let tiles = frame.points.len().div_ceil(tile);
     let first = tiles * part / UNITS_PER_FRAME;
     let last = tiles * (part + 1) / UNITS_PER_FRAME;

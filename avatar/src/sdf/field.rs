@@ -12,7 +12,7 @@ use super::{
     kernel::{self, Network, Workspace, tile_points},
 };
 
-/// Below this many points a call stays on its own thread: waking others costs more.
+/// A call of fewer tiles stays on its own thread: waking others costs more.
 const PARALLEL_FROM_TILES: usize = 4;
 
 /// A SIREN: unit-space point to signed distance in unit lengths, positive outside.
@@ -67,10 +67,8 @@ impl SirenField {
 impl SignedDistanceField for SirenField {
     fn values(&self, points: &[Vec3], out: &mut [f32]) {
         assert_eq!(points.len(), out.len(), "one value a point");
-        let (net, size) = (
-            Network::new(self.config, &self.parameters),
-            tile_points(self.config),
-        );
+        let net = Network::new(self.config, &self.parameters);
+        let size = tile_points(self.config);
         let spare = SpareWorkspaces::new(self.config);
         let tiles = points.par_chunks(size).zip(out.par_chunks_mut(size));
         let tile = |(points, out): (&[Vec3], &mut [f32])| {
@@ -88,10 +86,8 @@ impl SignedDistanceField for SirenField {
             points.len() == values.len() && points.len() == gradients.len(),
             "one a point"
         );
-        let (net, size) = (
-            Network::new(self.config, &self.parameters),
-            tile_points(self.config),
-        );
+        let net = Network::new(self.config, &self.parameters);
+        let size = tile_points(self.config);
         let spare = SpareWorkspaces::new(self.config);
         let tile = |((points, values), gradients): ((&[Vec3], &mut [f32]), &mut [Vec3])| {
             spare.with(|work| {

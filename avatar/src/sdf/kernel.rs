@@ -129,6 +129,11 @@ impl Workspace {
             first_columns: std::array::from_fn(|_| vec![0.0; config.hidden]),
         }
     }
+
+    /// As many points at most as the kernels take with these buffers.
+    pub(crate) fn tile_points(&self) -> usize {
+        self.values.len()
+    }
 }
 
 /// Values of a tile at most.
