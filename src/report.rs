@@ -54,8 +54,12 @@ pub(crate) struct FrameCounts {
     pub(crate) dropped_while_fine_tuning: u64,
 }
 
-#[derive(Clone, Copy, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize)]
 pub(crate) struct FineTuneFigures {
+    /// What computed the steps: "CPU", "AMD Radeon RX 7600".
+    pub(crate) device: String,
+    /// Why a graphics card that was at hand did not.
+    pub(crate) gave_up: Option<String>,
     pub(crate) steps: usize,
     pub(crate) seconds: f64,
     pub(crate) loss: f32,
@@ -152,9 +156,12 @@ impl fmt::Display for Report {
         if let Some(tune) = &self.fine_tune {
             writeln!(
                 f,
-                "fine-tuning {} steps in {:.1} s, {:.1} mm held out; {} avatars made",
-                tune.steps, tune.seconds, tune.held_out_mm, self.avatars
+                "fine-tuning {} steps in {:.1} s on {}, {:.1} mm held out; {} avatars made",
+                tune.steps, tune.seconds, tune.device, tune.held_out_mm, self.avatars
             )?;
+            if let Some(reason) = &tune.gave_up {
+                writeln!(f, "            no graphics card: {reason}")?;
+            }
         }
         if let Some(DriveFigures { device, gave_up }) = &self.drive {
             writeln!(f, "driven by   {device}")?;

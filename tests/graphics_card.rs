@@ -6,9 +6,10 @@ use std::{fs, path::Path, process::Command};
 const SETTINGS: &str = "[fine_tune]\nsteps = 4\n[map]\nmodes = 0\n[preview]\nsteps = 0\n\
     [schedule]\nswap_after_frames = 55\n";
 
-/// Replays what was simulated, driven by `device`; what it said, or what went wrong.
+/// Replays what was simulated, driven and learned by `device`; what it said, or what went wrong.
 fn replay(here: &Path, device: &str, backend: Option<&str>) -> Result<String, String> {
-    let settings = format!("{SETTINGS}[drive]\ndevice = \"{device}\"\n");
+    let wished = format!("device = \"{device}\"\n");
+    let settings = format!("{SETTINGS}[drive]\n{wished}[learn]\n{wished}");
     fs::write(here.join("settings.toml"), settings).expect("the folder is this test's");
     let mut command = Command::new(env!("CARGO_BIN_EXE_effigy"));
     command
@@ -46,35 +47,49 @@ fn report(here: &Path, device: &str) -> serde_json::Value {
 }
 
 #[test]
-fn runs_say_what_drove_and_a_card_that_is_not_there_is_missed() {
+fn runs_say_what_drove_and_learned_and_a_card_that_is_not_there_is_missed() {
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
     simulate(here);
 
     replay(here, "auto", None).unwrap();
-    let drive = &report(here, "auto")["drive"];
+    let by_cpu = report(here, "auto");
     assert_eq!(
-        drive["device"], "CPU, full field",
+        (&by_cpu["drive"]["device"], &by_cpu["fine_tune"]["device"]),
+        (&"CPU, full field".into(), &"CPU".into()),
         "a replay repeats itself"
     );
-    assert!(drive["gave_up"].is_null());
+    assert!(by_cpu["drive"]["gave_up"].is_null() && by_cpu["fine_tune"]["gave_up"].is_null());
 
     let elsewhere = if cfg!(windows) { "metal" } else { "dx12" };
     let said = replay(here, "gpu", Some(elsewhere)).unwrap_err();
     println!("{said}");
-    assert!(said.contains("drive.device is \"gpu\""), "{said}");
+    assert!(
+        said.contains("drive.device or learn.device is \"gpu\""),
+        "{said}"
+    );
 
     match replay(here, "gpu", None) {
         Ok(said) => {
-            let drive = &report(here, "gpu")["drive"];
+            let by_card = report(here, "gpu");
+            let (drive, fine_tune) = (&by_card["drive"], &by_card["fine_tune"]);
             let device = drive["device"].as_str().unwrap();
             println!("driven by {device}");
             assert!(!device.starts_with("CPU") && device.ends_with(", full field"));
             assert!(said.contains(device) && drive["gave_up"].is_null());
+            let name = device.trim_end_matches(", full field");
+            assert_eq!(fine_tune["device"], name);
+            assert!(fine_tune["gave_up"].is_null());
+            let loss = |of: &serde_json::Value| of["fine_tune"]["loss"].as_f64().unwrap();
+            let (ours, twin) = (loss(&by_card), loss(&by_cpu));
+            assert!((ours / twin - 1.0).abs() < 1e-2, "{ours} {twin}");
         }
         Err(said) => {
             println!("no graphics card here: {said}");
-            assert!(said.contains("drive.device is \"gpu\""), "{said}");
+            assert!(
+                said.contains("drive.device or learn.device is \"gpu\""),
+                "{said}"
+            );
         }
     }
 }

@@ -3,7 +3,7 @@
 use std::{collections::BTreeMap, path::Path, sync::Arc};
 
 use anyhow::Context as _;
-use effigy_capture::FrameSource;
+use effigy_capture::{Calibration, FrameSource};
 use effigy_registration::{BodyModel, SmoothConfig, smpl::builtin};
 use effigy_sim_sensor::Truth;
 use effigy_viewer::SnapshotSlot;
@@ -18,7 +18,7 @@ use crate::{
         avatar_stage::AvatarStage,
         clock::{Clock, percentile},
         controls::Controls,
-        drive_device::DriveDevice,
+        devices::Devices,
         evaluate::evaluate,
         lock_step,
         outputs::Outputs,
@@ -124,7 +124,7 @@ pub(crate) fn report_of(
         Pace::LockStep => input.decided.take().unwrap_or(Schedule::AfterFrames),
         Pace::RealTime => Schedule::WhenReady,
     };
-    let device = DriveDevice::choose(settings.drive.device, &schedule, window.as_deref())?;
+    let devices = Devices::choose(settings.wishes(), &schedule, window.as_deref())?;
     let mut outputs = Outputs::new(args, &calibration, frame_count, &body)?;
     if let Some(slot) = window {
         outputs.publish(Publisher::new(
@@ -140,15 +140,17 @@ pub(crate) fn report_of(
         input.truth = None;
     }
     if let Some(path) = &args.record {
-        let when_slow = match input.pace {
-            Pace::LockStep => WhenDiskIsSlow::Wait,
-            Pace::RealTime => WhenDiskIsSlow::LeaveOut,
-        };
-        let recorder = Recorder::create(path, &calibration, &input.metadata, when_slow)?;
-        outputs.record_to(recorder);
+        outputs.record_to(recorder(path, &input, &calibration)?);
     }
     let depth = calibration.depth;
-    let mut avatar = AvatarStage::new(Arc::clone(&body), depth, &settings, device, schedule, clock);
+    let mut avatar = AvatarStage::new(
+        Arc::clone(&body),
+        depth,
+        &settings,
+        devices,
+        schedule,
+        clock,
+    );
     let stages = (&mut avatar, &mut outputs);
     let log = match input.pace {
         Pace::LockStep => lock_step::run(&mut *input.source, &body, &settings, stages, clock)?,
@@ -181,6 +183,14 @@ pub(crate) fn report_of(
     Ok(report)
 }
 
+fn recorder(path: &Path, input: &Input, calibration: &Calibration) -> anyhow::Result<Recorder> {
+    let when_slow = match input.pace {
+        Pace::LockStep => WhenDiskIsSlow::Wait,
+        Pace::RealTime => WhenDiskIsSlow::LeaveOut,
+    };
+    Recorder::create(path, calibration, &input.metadata, when_slow)
+}
+
 /// The built-in body, or a file's.
 pub(crate) fn body_model(path: Option<&Path>) -> anyhow::Result<Arc<BodyModel>> {
     match path {
@@ -210,6 +220,8 @@ fn report(source: String, log: &RunLog) -> Report {
         keyframes: log.keyframes.len(),
         avatars: log.jobs.len(),
         fine_tune: log.jobs.last().map(|job| FineTuneFigures {
+            device: job.device.clone(),
+            gave_up: job.gave_up.clone(),
             steps: job.steps,
             seconds: job.fine_tune_secs,
             loss: job.loss,

@@ -15,7 +15,7 @@ use crossbeam::channel::{Receiver, RecvTimeoutError, Select, Sender, TryRecvErro
 use effigy_avatar::{
     Avatar, CanonicalSamples, Canonicaliser, DriveConfig, Driver, MapConfig, ShapeMap,
     TopologyConfig,
-    fine_tune::{FineTuneProgress, fine_tune},
+    fine_tune::{FineTuneProgress, FineTuner},
     hyper::HyperNetwork,
     keyframes::Keyframe,
     nn::Threads,
@@ -28,6 +28,7 @@ use effigy_registration::{
 
 use super::{
     clock::Clock,
+    graphics_card::LentCard,
     refine::{OnStep, Refinement},
     settings::Settings,
 };
@@ -96,8 +97,12 @@ pub(crate) struct FinishedAvatar {
 }
 
 /// What making an avatar took and came to.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct JobFigures {
+    /// What computed the steps.
+    pub(crate) device: String,
+    /// Why a graphics card that was at hand did not.
+    pub(crate) gave_up: Option<String>,
     pub(crate) steps: usize,
     pub(crate) loss: f32,
     pub(crate) held_out_mm: f32,
@@ -115,6 +120,7 @@ impl AvatarJob {
         body: &Arc<BodyModel>,
         settings: &Settings,
         (beside, clock): (Beside, Clock),
+        card: LentCard,
     ) -> anyhow::Result<Self> {
         let cancel = Arc::new(AtomicBool::new(false));
         let progress = Arc::new(Mutex::new(FineTuneProgress::default()));
@@ -130,6 +136,7 @@ impl AvatarJob {
             to_preview,
             beside,
             clock,
+            card,
         };
         let thread = thread::Builder::new()
             .name("fine-tune".to_owned())
@@ -234,6 +241,7 @@ struct Work {
     to_preview: Sender<Preview>,
     beside: Beside,
     clock: Clock,
+    card: LentCard,
 }
 
 impl Work {
@@ -289,23 +297,27 @@ impl Work {
         let samples = self.samples(&canonicaliser, &prior, &mut on_step)?;
         let tuning_started = self.clock.secs();
         let mut last = FineTuneProgress::default();
-        let network = fine_tune(
+        let mut tuner = FineTuner::new(
             prior,
             &samples,
             subject.unit_box.metres_per_unit(),
             &self.settings.fine_tune,
-            &|| self.clock.secs(),
-            &mut |now, network| {
-                last = *now;
-                on_step(
-                    &FineTuneProgress { step: before + now.step, ..*now },
-                    network,
-                )
-            },
         )?;
+        self.card.help(&mut tuner, &self.clock);
+        tuner.run(&|| self.clock.secs(), &mut |now, network| {
+            last = *now;
+            on_step(
+                &FineTuneProgress { step: before + now.step, ..*now },
+                network,
+            )
+        })?;
+        let device = tuner.device().to_owned();
+        let gave_up = tuner.gave_up().map(str::to_owned);
         let fine_tune_secs = self.clock.secs() - tuning_started;
-        let (driver, map_p95_mm) = driver_of(network, &self.settings.map)?;
+        let (driver, map_p95_mm) = driver_of(tuner.into_network(), &self.settings.map)?;
         let figures = JobFigures {
+            device,
+            gave_up,
             steps: last.step as usize,
             loss: last.loss.total() as f32,
             held_out_mm: last.held_out_residual_m * 1e3,

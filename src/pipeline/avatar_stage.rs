@@ -13,7 +13,7 @@ use effigy_registration::{BodyModel, RegisteredFrame, SmoothConfig, Smoother};
 use super::{
     avatar_job::{AvatarJob, Beside, FinishedAvatar, JobFigures, Preview, PreviewFigures},
     clock::{Clock, Timings},
-    drive_device::DriveDevice,
+    devices::Devices,
     schedule::{Decision, Schedule},
     settings::Settings,
     track_stage::{Followed, Handover},
@@ -23,7 +23,7 @@ pub(crate) struct AvatarStage {
     body: Arc<BodyModel>,
     camera: CameraModel,
     settings: Settings,
-    device: DriveDevice,
+    devices: Devices,
     schedule: Schedule,
     clock: Clock,
     selector: KeyframeSelector,
@@ -65,7 +65,7 @@ impl AvatarStage {
         body: Arc<BodyModel>,
         camera: CameraModel,
         settings: &Settings,
-        device: DriveDevice,
+        devices: Devices,
         schedule: Schedule,
         clock: Clock,
     ) -> Self {
@@ -73,7 +73,7 @@ impl AvatarStage {
             body,
             camera,
             settings: settings.clone(),
-            device,
+            devices,
             schedule,
             clock,
             selector: KeyframeSelector::new(settings.keyframes.clone()),
@@ -324,6 +324,7 @@ impl AvatarStage {
             &self.body,
             &self.settings,
             (self.beside(), self.clock),
+            self.devices.card_to_learn_with(),
         )?;
         self.gave_up = false;
         self.making =
@@ -341,7 +342,7 @@ impl AvatarStage {
             let keyframes = making.keyframes.clone();
             self.learned_from.extend(&keyframes);
             self.preview = Some((Arc::clone(driver.avatar()), figures));
-            let driver = self.device.driver(driver, &self.clock);
+            let driver = self.devices.driver(driver, &self.clock);
             self.made = Some(Made { driver, is_preview: true, frames_driven: 0, keyframes });
         }
     }
@@ -358,7 +359,7 @@ impl AvatarStage {
         let FinishedAvatar { driver, figures } = finished?;
         self.learned_from.extend(&keyframes);
         self.figures.push(figures);
-        let driver = self.device.driver(driver, &self.clock);
+        let driver = self.devices.driver(driver, &self.clock);
         self.made = Some(Made { driver, is_preview: false, frames_driven: 0, keyframes });
         Ok(())
     }

@@ -1,4 +1,5 @@
-//! A graphics card that drives avatars. Opening one takes tenths of a second, which the first frames need not wait for.
+//! A graphics card that drives avatars and learns them. Opening one takes tenths of a second, which the first frames need
+//! not wait for.
 
 use std::{
     sync::Arc,
@@ -8,6 +9,7 @@ use std::{
 use anyhow::Context as _;
 use effigy_avatar::{
     Driver, LiveDriver,
+    fine_tune::FineTuner,
     gpu::{Gpu, GpuError},
     sdf::SirenConfig,
 };
@@ -22,8 +24,31 @@ use super::clock::Clock;
 pub(crate) struct GraphicsCard {
     opening: Option<JoinHandle<Option<Arc<Gpu>>>>,
     gpu: Option<Arc<Gpu>>,
-    /// Whether it still has to show that it is fast enough.
+    /// Whether it has shown what it drives like.
+    has_driven: bool,
+}
+
+/// A card for somebody to learn with, or none.
+#[derive(Clone, Default)]
+pub(crate) struct LentCard {
+    gpu: Option<Arc<Gpu>>,
     on_trial: bool,
+}
+
+impl LentCard {
+    pub(crate) fn none() -> Self {
+        Self::default()
+    }
+
+    /// Has steps computed on the card, if there is one; one on trial only if it is right and faster than the processor.
+    pub(crate) fn help(&self, tuner: &mut FineTuner, clock: &Clock) {
+        if let Some(gpu) = &self.gpu {
+            tuner.lend(gpu);
+            if self.on_trial {
+                tuner.try_out(&|| clock.secs());
+            }
+        }
+    }
 }
 
 /// What two cores take for a pose in the full field: who is slower than that is of no help. A map is faster still, but it
@@ -46,10 +71,10 @@ impl GraphicsCard {
 
     /// Any adapter, opened here and now; it is an error if there is none.
     pub(crate) fn open(window: Option<&SnapshotSlot>) -> anyhow::Result<Self> {
-        let gpu = opener(window)()
-            .and_then(prepared)
-            .context("drive.device is \"gpu\" (\"auto\" would go on without one)")?;
-        Ok(Self { opening: None, gpu: Some(gpu), on_trial: false })
+        let gpu = opener(window)().and_then(prepared).context(
+            "drive.device or learn.device is \"gpu\" (\"auto\" would go on without one)",
+        )?;
+        Ok(Self { opening: None, gpu: Some(gpu), has_driven: false })
     }
 
     /// One that is worth it, if there is one.
@@ -59,7 +84,7 @@ impl GraphicsCard {
             .name("graphics card".to_owned())
             .spawn(move || worth_it(open()))
             .context("cannot start the thread that opens the graphics card")?;
-        Ok(Self { opening: Some(thread), gpu: None, on_trial: true })
+        Ok(Self { opening: Some(thread), gpu: None, has_driven: false })
     }
 
     #[cfg(test)]
@@ -67,23 +92,32 @@ impl GraphicsCard {
         self.opening.is_none() && self.gpu.is_none()
     }
 
-    /// Does not wait for a card that is still being opened: the next avatar can have it.
-    pub(crate) fn driver(&mut self, cpu: Driver, clock: &Clock) -> LiveDriver {
-        if self.opening.as_ref().is_none_or(JoinHandle::is_finished) {
-            self.wait();
-        }
-        let Some(gpu) = &self.gpu else {
+    /// On the card, which the first time is on trial if nobody asked for it by name. Does not wait for a card that is
+    /// still being opened: the next avatar can have it.
+    pub(crate) fn driver(&mut self, cpu: Driver, on_trial: bool, clock: &Clock) -> LiveDriver {
+        let Some(gpu) = self.opened() else {
             return LiveDriver::on_cpu(cpu);
         };
-        let mut driver = LiveDriver::on_gpu(cpu, gpu);
-        if self.on_trial && driver.gave_up().is_none() {
+        let mut driver = LiveDriver::on_gpu(cpu, &gpu);
+        if on_trial && !self.has_driven && driver.gave_up().is_none() {
             try_out(&mut driver, gpu.name(), clock);
             if driver.gave_up().is_some() {
                 self.gpu = None;
             }
-            self.on_trial = false;
+            self.has_driven = true;
         }
         driver
+    }
+
+    pub(crate) fn lent(&mut self, on_trial: bool) -> LentCard {
+        LentCard { gpu: self.opened(), on_trial }
+    }
+
+    fn opened(&mut self) -> Option<Arc<Gpu>> {
+        if self.opening.as_ref().is_none_or(JoinHandle::is_finished) {
+            self.wait();
+        }
+        self.gpu.clone()
     }
 
     fn wait(&mut self) {
@@ -202,17 +236,17 @@ mod tests {
             }
         };
         let clock = Clock::start();
-        let named =
-            |on_trial| GraphicsCard { opening: None, gpu: Some(Arc::clone(&gpu)), on_trial };
+        let open =
+            || GraphicsCard { opening: None, gpu: Some(Arc::clone(&gpu)), has_driven: false };
         let by_card = format!("{}, full field", gpu.name());
-        let asked_for = named(false).driver(driver(), &clock);
+        let asked_for = open().driver(driver(), false, &clock);
         assert_eq!(
             (asked_for.device(), asked_for.gave_up()),
             (by_card.clone(), None)
         );
 
-        let mut card = named(true);
-        let tried = card.driver(driver(), &clock);
+        let mut card = open();
+        let tried = card.driver(driver(), true, &clock);
         println!("{}, {:?}", tried.device(), tried.gave_up());
         assert_eq!(tried.gave_up().is_some(), card.gpu.is_none());
         match tried.gave_up() {
@@ -224,6 +258,6 @@ mod tests {
         }
         // Four thousand vertices take the processor a tenth of a second if it has to play the card.
         assert!(!gpu.is_software() || tried.gave_up().is_some());
-        assert_eq!(card.driver(driver(), &clock).device(), tried.device());
+        assert_eq!(card.driver(driver(), true, &clock).device(), tried.device());
     }
 }

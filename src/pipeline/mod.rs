@@ -4,9 +4,9 @@ pub(crate) mod avatar_job;
 pub(crate) mod avatar_stage;
 pub(crate) mod clock;
 pub(crate) mod controls;
-pub(crate) mod drive_device;
+pub(crate) mod devices;
 pub(crate) mod evaluate;
-#[cfg_attr(not(feature = "gpu-drive"), path = "no_graphics_card.rs")]
+#[cfg_attr(not(feature = "gpu"), path = "no_graphics_card.rs")]
 mod graphics_card;
 pub(crate) mod lock_step;
 pub(crate) mod outputs;

@@ -17,7 +17,10 @@ use effigy_fusion::clean::CleanConfig;
 use effigy_registration::{SmoothConfig, smpl::BodyIdentity, track::TrackConfig};
 use serde::{Deserialize, Serialize};
 
-use super::{drive_device::DriveSettings, refine::RefineConfig};
+use super::{
+    devices::{DeviceSettings, Wishes},
+    refine::RefineConfig,
+};
 use crate::files;
 
 /// More would not be few shots any more, and fill the memory.
@@ -44,7 +47,9 @@ pub(crate) struct Settings {
     /// How an avatar's shape is learned as a function of the pose, so that the drive need not evaluate its field.
     pub(crate) map: MapConfig,
     /// What poses the avatar once there is one.
-    pub(crate) drive: DriveSettings,
+    pub(crate) drive: DeviceSettings,
+    /// What computes the steps of fine-tuning.
+    pub(crate) learn: DeviceSettings,
     pub(crate) preview: PreviewConfig,
     pub(crate) schedule: ScheduleConfig,
 }
@@ -106,6 +111,11 @@ impl Settings {
             .check()
             .with_context(|| path.display().to_string())?;
         Ok(settings)
+    }
+
+    /// What drives and what learns, as far as the user has a wish.
+    pub(crate) fn wishes(&self) -> Wishes {
+        Wishes { drive: self.drive.device, learn: self.learn.device }
     }
 
     /// The network that fine-tuning starts from; one of the user's own must belong to the body.

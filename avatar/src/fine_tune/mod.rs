@@ -4,10 +4,11 @@
 //! stage reads no clock: the caller passes one in.
 
 mod config;
+mod live_gradients;
 pub(crate) mod sampling;
 mod step;
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;
 
 pub use config::{FineTuneConfig, SamplingConfig};
 pub use step::{FineTuneProgress, FineTuner, fine_tune};

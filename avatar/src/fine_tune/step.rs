@@ -1,6 +1,8 @@
 //! The stage itself: one Adam step at a time, over all keyframes or some of them.
 
 use std::ops::ControlFlow;
+#[cfg(feature = "gpu")]
+use std::sync::Arc;
 
 use glam::Vec3;
 use rand::{SeedableRng as _, rngs::StdRng};
@@ -8,15 +10,18 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     FineTuneConfig,
+    live_gradients::LiveGradients,
     sampling::{self, KeyframePoints, SurfacePoint},
 };
+#[cfg(feature = "gpu")]
+use crate::gpu::Gpu;
 use crate::{
     CanonicalSamples, PoseInput, SignedDistanceField as _,
     error::AvatarError,
     hyper::{HyperNetwork, optimizer::HyperOptimizer},
     sdf::{
         SirenField,
-        batch::{FieldFrame, FieldGradients},
+        batch::FieldFrame,
         loss::{LossPoint, LossTerms},
     },
 };
@@ -49,26 +54,7 @@ pub fn fine_tune(
     on_progress: &mut dyn FnMut(&FineTuneProgress, &HyperNetwork) -> ControlFlow<()>,
 ) -> Result<HyperNetwork, AvatarError> {
     let mut tuner = FineTuner::new(network, samples, metres_per_unit, config)?;
-    let start_secs = clock();
-    let mut progress = FineTuneProgress {
-        steps: config.steps,
-        held_out_residual_m: tuner.held_out_residual_m(),
-        ..FineTuneProgress::default()
-    };
-    while progress.step < config.steps {
-        progress.loss = tuner.step()?;
-        progress.step += 1;
-        let is_last = progress.step == config.steps;
-        if is_last || progress.step.is_multiple_of(config.held_out_every.max(1)) {
-            progress.held_out_residual_m = tuner.held_out_residual_m();
-        }
-        progress.elapsed_secs = clock() - start_secs;
-        let left = f64::from(config.steps - progress.step) / f64::from(progress.step);
-        progress.left_secs = progress.elapsed_secs * left;
-        if on_progress(&progress, tuner.network()).is_break() {
-            break;
-        }
-    }
+    tuner.run(clock, on_progress)?;
     Ok(tuner.into_network())
 }
 
@@ -78,7 +64,7 @@ pub struct FineTuner {
     optimizer: HyperOptimizer,
     /// Of the steps that look for who it is, as long as they last.
     code_optimizer: Option<HyperOptimizer>,
-    gradients: FieldGradients,
+    gradients: LiveGradients,
     config: FineTuneConfig,
     metres_per_unit: f32,
     poses: Vec<PoseInput>,
@@ -106,7 +92,7 @@ impl FineTuner {
         Ok(Self {
             code_optimizer: (config.code_steps > 0).then(code_optimizer),
             optimizer: HyperOptimizer::new(&network, &inputs, &config.rates),
-            gradients: FieldGradients::new(network.config().field),
+            gradients: LiveGradients::on_cpu(network.config().field),
             network,
             config: *config,
             metres_per_unit,
@@ -119,21 +105,80 @@ impl FineTuner {
         })
     }
 
-    /// One Adam step over all keyframes, or as many as a step takes; the loss before it.
-    pub fn step(&mut self) -> Result<LossTerms, AvatarError> {
+    /// Computes on the device from now on, for as long as it is well.
+    #[cfg(feature = "gpu")]
+    pub fn lend(&mut self, gpu: &Arc<Gpu>) {
+        self.gradients.lend(gpu, self.network.config().field);
+    }
+
+    /// Gives a lent device up unless it computes what the processor does, and sooner; moves nothing. `clock` as that of
+    /// [`fine_tune`].
+    #[cfg(feature = "gpu")]
+    pub fn try_out(&mut self, clock: &dyn Fn() -> f64) {
+        let of_steps = std::mem::replace(&mut self.rng, StdRng::seed_from_u64(self.config.seed));
+        let poses = self.draw();
+        self.rng = of_steps;
+        let (_, parameters) = self.network.forward(&poses);
+        let frames = frames(&parameters, &self.points, &self.known);
+        self.gradients.try_out(&frames, &self.config.loss, clock);
+    }
+
+    /// What computes steps: "CPU", "AMD Radeon RX 7600".
+    pub fn device(&self) -> &str {
+        self.gradients.device()
+    }
+
+    /// Why a device that was lent does not compute.
+    pub fn gave_up(&self) -> Option<&str> {
+        self.gradients.gave_up()
+    }
+
+    /// All steps that are left, as [`fine_tune`] does them.
+    pub fn run(
+        &mut self,
+        clock: &dyn Fn() -> f64,
+        on_progress: &mut dyn FnMut(&FineTuneProgress, &HyperNetwork) -> ControlFlow<()>,
+    ) -> Result<(), AvatarError> {
+        let (steps, every) = (self.config.steps, self.config.held_out_every.max(1));
+        let start_secs = clock();
+        let mut progress = FineTuneProgress {
+            steps,
+            held_out_residual_m: self.held_out_residual_m(),
+            ..FineTuneProgress::default()
+        };
+        while progress.step < steps {
+            progress.loss = self.step()?;
+            progress.step += 1;
+            let is_last = progress.step == steps;
+            if is_last || progress.step.is_multiple_of(every) {
+                progress.held_out_residual_m = self.held_out_residual_m();
+            }
+            progress.elapsed_secs = clock() - start_secs;
+            let left = f64::from(steps - progress.step) / f64::from(progress.step);
+            progress.left_secs = progress.elapsed_secs * left;
+            if on_progress(&progress, &self.network).is_break() {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    /// What the next step learns from, into `points` and `known`; the poses of the keyframes taken.
+    fn draw(&mut self) -> Vec<PoseInput> {
         let wanted = self.config.frames_per_step;
         let taken = sampling::choose(self.keyframes.len(), wanted, &mut self.rng);
         let drawn = self.points.iter_mut().zip(&mut self.known);
         for (&keyframe, (points, known)) in taken.iter().zip(drawn) {
             self.keyframes[keyframe].draw(&self.config.sampling, &mut self.rng, points, known);
         }
-        let poses: Vec<_> = taken.iter().map(|&keyframe| self.poses[keyframe]).collect();
+        taken.iter().map(|&keyframe| self.poses[keyframe]).collect()
+    }
+
+    /// One Adam step over all keyframes, or as many as a step takes; the loss before it.
+    pub fn step(&mut self) -> Result<LossTerms, AvatarError> {
+        let poses = self.draw();
         let (cache, parameters) = self.network.forward(&poses);
-        let frames: Vec<_> = parameters
-            .iter()
-            .zip(self.points.iter().zip(&self.known))
-            .map(|(parameters, (points, known))| FieldFrame { parameters, points, known })
-            .collect();
+        let frames = frames(&parameters, &self.points, &self.known);
         let terms = self.gradients.compute(&frames, &self.config.loss);
         if !terms.total().is_finite() {
             return Err(AvatarError::LossNotFinite { step: self.step, terms });
@@ -196,6 +241,19 @@ impl FineTuner {
     pub fn into_network(self) -> HyperNetwork {
         self.network
     }
+}
+
+/// Each keyframe's field and what is known of it.
+fn frames<'a>(
+    parameters: &'a [Vec<f32>],
+    points: &'a [Vec<Vec3>],
+    known: &'a [Vec<LossPoint>],
+) -> Vec<FieldFrame<'a>> {
+    parameters
+        .iter()
+        .zip(points.iter().zip(known))
+        .map(|(parameters, (points, known))| FieldFrame { parameters, points, known })
+        .collect()
 }
 
 /// The field's values, unit lengths, at points that were measured.

@@ -49,7 +49,7 @@ fn radius(bend_rad: f32) -> f32 {
     0.5 + 0.05 * bend_rad
 }
 
-fn config() -> FineTuneConfig {
+pub(crate) fn config() -> FineTuneConfig {
     FineTuneConfig {
         steps: 120,
         held_out_every: 40,
@@ -65,13 +65,13 @@ fn config() -> FineTuneConfig {
     }
 }
 
-fn network() -> HyperNetwork {
+pub(crate) fn network() -> HyperNetwork {
     let mut rng = StdRng::seed_from_u64(3);
     let meta = SirenField::init(SMALL.field, &mut rng);
     HyperNetwork::init(SMALL, &meta, &mut rng)
 }
 
-fn keyframes() -> Vec<CanonicalSamples> {
+pub(crate) fn keyframes() -> Vec<CanonicalSamples> {
     [0.0, 0.5, 1.0].map(keyframe).to_vec()
 }
 

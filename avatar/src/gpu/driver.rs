@@ -1,18 +1,16 @@
 //! One avatar on one device: everything that stays is uploaded once, a pose takes its parameters up and its mesh down.
 
-use std::{
-    sync::{Arc, mpsc::sync_channel},
-    time::Duration,
-};
+use std::sync::Arc;
 
 use effigy_capture::FrameId;
 use effigy_registration::{BodyParams, smpl::BoneTransforms};
 use glam::Vec3;
 
 use super::{
+    buffers::{self, buffer},
     device::Gpu,
     error::GpuError,
-    kernels::{Kernels, SKIN_GROUP, at_most},
+    kernels::{self, Kernels, SKIN_GROUP, at_most},
     layout::{self, PoseBlock, rows},
 };
 use crate::{
@@ -20,9 +18,6 @@ use crate::{
     model::Avatar,
     sdf::{SirenConfig, SirenField},
 };
-
-/// A device that takes longer hangs: a pose takes milliseconds, seconds where the processor plays the device.
-const PATIENCE: Duration = Duration::from_secs(10);
 
 /// Poses one avatar in its full field; the twin of a [`Driver`] without a map.
 pub struct GpuDriver {
@@ -149,51 +144,12 @@ impl GpuDriver {
     }
 
     fn download(&self, submission: wgpu::SubmissionIndex) -> Result<[Vec<Vec3>; PARTS], GpuError> {
-        let readable = &self.buffers.readable;
-        let (tell, told) = sync_channel(1);
-        readable
-            .slice(..)
-            .map_async(wgpu::MapMode::Read, move |mapped| {
-                // Nobody listens any more after an error.
-                drop(tell.send(mapped));
-            });
-        let wait =
-            wgpu::PollType::Wait { submission_index: Some(submission), timeout: Some(PATIENCE) };
-        let waited = self.gpu.device.poll(wait);
-        self.gpu.check()?;
-        waited.map_err(|error| self.gave_no_answer(&error))?;
-        match told.try_recv() {
-            Ok(Ok(())) => {}
-            Ok(Err(error)) => return Err(self.gpu.failed(&error)),
-            Err(_) => return Err(self.gpu.failed(&"what it computed cannot be read")),
-        }
-        let bytes = readable.slice(..).get_mapped_range();
-        let bytes = bytes.map_err(|error| self.gpu.failed(&error))?;
-        let part_bytes = bytes.len() / PARTS;
-        let parts = std::array::from_fn(|part| {
-            bytemuck::pod_collect_to_vec(&bytes[part * part_bytes..][..part_bytes])
-        });
-        drop(bytes);
-        readable.unmap();
-        Ok(parts)
-    }
-
-    fn gave_no_answer(&self, error: &wgpu::PollError) -> GpuError {
-        let adapter = self.gpu.name().to_owned();
-        match error {
-            wgpu::PollError::Timeout => GpuError::Silent { adapter, secs: PATIENCE.as_secs() },
-            // A lost device takes no work; why it was lost it tells only who asks once more.
-            wgpu::PollError::WrongSubmissionIndex(..) => {
-                let asked = self.gpu.device.poll(wgpu::PollType::Poll);
-                let why = asked
-                    .err()
-                    .map_or_else(String::new, |error| error.to_string());
-                self.gpu
-                    .check()
-                    .err()
-                    .unwrap_or(GpuError::Lost { adapter, why })
-            }
-        }
+        buffers::read_back(&self.gpu, &self.buffers.readable, submission, |bytes| {
+            let part_bytes = bytes.len() / PARTS;
+            std::array::from_fn(|part| {
+                bytemuck::pod_collect_to_vec(&bytes[part * part_bytes..][..part_bytes])
+            })
+        })
     }
 }
 
@@ -206,10 +162,7 @@ impl Buffers {
         let fans = layout::fans(count, &topology.triangles);
         let result_bytes = PARTS * count * size_of::<Vec3>();
         let field_bytes = layout::packed_len(config) * size_of::<f32>();
-        let limits = gpu.device.limits();
-        let allowed = limits
-            .max_storage_buffer_binding_size
-            .min(limits.max_buffer_size);
+        let allowed = buffers::most_bytes(gpu);
         for bytes in [
             size_of_val(&vertices[..]),
             size_of_val(&fans[..]),
@@ -253,25 +206,9 @@ impl Buffers {
     }
 
     fn bound(&self, device: &wgpu::Device, layout: &wgpu::BindGroupLayout) -> wgpu::BindGroup {
-        let bound = [
-            &self.pose,
-            &self.field,
-            &self.vertices,
-            &self.result,
-            &self.fans,
-        ];
-        let entries: Vec<_> = (0..)
-            .zip(bound)
-            .map(|(binding, buffer)| wgpu::BindGroupEntry {
-                binding,
-                resource: buffer.as_entire_binding(),
-            })
-            .collect();
-        device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some("drive"),
-            layout,
-            entries: &entries,
-        })
+        let Self { pose, field, vertices, result, fans, .. } = self;
+        let all = [pose, field, vertices, result, fans];
+        buffers::bound(device, "drive", layout, &all)
     }
 }
 
@@ -283,10 +220,7 @@ pub(super) fn can_drive(driver: &Driver) -> Result<(SirenConfig, u32), GpuError>
     let avatar = driver.avatar();
     let params = BodyParams { theta: avatar.topology_theta, ..BodyParams::ZERO };
     let config = siren(avatar, &params)?.config();
-    // Each unit adds up the last layer's products of as many others as there are points in a tile.
-    if config.layers < 2 || config.hidden == 0 || !config.hidden.is_multiple_of(16) {
-        return Err(GpuError::FieldShape { config });
-    }
+    kernels::can_evaluate(config)?;
     Ok((config, u32::try_from(steps).unwrap_or(u32::MAX)))
 }
 
@@ -303,18 +237,4 @@ fn check_size(gpu: &Gpu, kernels: &Kernels, vertices: usize) -> Result<(), GpuEr
     let allowed = u64::from(groups) * u64::from(kernels.tile.points());
     at_most(gpu, "vertices", vertices as u64, allowed)?;
     at_most(gpu, "vertices", vertices as u64, u64::from(u32::MAX / 9))
-}
-
-fn buffer(
-    device: &wgpu::Device,
-    label: &str,
-    bytes: usize,
-    usage: wgpu::BufferUsages,
-) -> wgpu::Buffer {
-    device.create_buffer(&wgpu::BufferDescriptor {
-        label: Some(label),
-        size: bytes as u64,
-        usage,
-        mapped_at_creation: false,
-    })
 }

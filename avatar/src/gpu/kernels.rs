@@ -1,9 +1,11 @@
 //! The compiled kernels for fields of one width.
 
 use super::{device::Gpu, error::GpuError};
+use crate::sdf::SirenConfig;
 
 const SHARED: &str = include_str!("shared.wgsl");
 pub(super) const SINE: &str = include_str!("sine.wgsl");
+pub(super) const LAYER: &str = include_str!("layer.wgsl");
 const PROJECT: &str = include_str!("project.wgsl");
 const SKIN: &str = include_str!("skin.wgsl");
 const NORMALS: &str = include_str!("normals.wgsl");
@@ -38,7 +40,7 @@ impl Tile {
         }
     }
 
-    fn source(self) -> &'static str {
+    pub(super) fn source(self) -> &'static str {
         match self {
             Self::Of16 => include_str!("tile_of_16.wgsl"),
             Self::Of8 => include_str!("tile_of_8.wgsl"),
@@ -53,8 +55,14 @@ impl Tile {
 
     /// The larger one that fits.
     pub(super) fn for_width(hidden: u32, allowed_bytes: u32) -> Option<Self> {
-        let fits = |tile: &Self| tile.workgroup_bytes(hidden) <= allowed_bytes;
-        [Self::Of16, Self::Of8].into_iter().find(fits)
+        Self::that_takes(|tile| tile.workgroup_bytes(hidden), allowed_bytes)
+    }
+
+    /// The larger one that takes no more than is allowed.
+    pub(super) fn that_takes(bytes: impl Fn(Self) -> u32, allowed_bytes: u32) -> Option<Self> {
+        [Self::Of16, Self::Of8]
+            .into_iter()
+            .find(|tile| bytes(*tile) <= allowed_bytes)
     }
 }
 
@@ -87,9 +95,9 @@ impl Kernels {
             at_most(gpu, what, u64::from(needed), u64::from(allowed))?;
         }
         let tile = tile.unwrap_or(Tile::Of8);
-        let layout = bind_group_layout(&gpu.device);
+        let layout = bind_group_layout(&gpu.device, "drive", &[false, false, true, false]);
         let project = format!(
-            "const HIDDEN = {hidden}u;\n{SHARED}{SINE}{}{PROJECT}",
+            "const HIDDEN = {hidden}u;\n{SHARED}{SINE}{}{LAYER}{PROJECT}",
             tile.source()
         );
         let kernels = Self {
@@ -109,6 +117,15 @@ impl Kernels {
     }
 }
 
+/// Refuses fields of a shape that the kernels do not know.
+pub(super) fn can_evaluate(config: SirenConfig) -> Result<(), GpuError> {
+    // Each unit adds up the last layer's products of as many others as there are points in a tile.
+    if config.layers < 2 || config.hidden == 0 || !config.hidden.is_multiple_of(16) {
+        return Err(GpuError::FieldShape { config });
+    }
+    Ok(())
+}
+
 pub(super) fn at_most(
     gpu: &Gpu,
     what: &'static str,
@@ -121,16 +138,22 @@ pub(super) fn at_most(
     Err(GpuError::Limit { adapter: gpu.name().to_owned(), what, needed, allowed })
 }
 
-fn bind_group_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
-    let read = wgpu::BufferBindingType::Storage { read_only: true };
-    let written = wgpu::BufferBindingType::Storage { read_only: false };
-    let types = [wgpu::BufferBindingType::Uniform, read, read, written, read];
+/// A uniform, then storage: written to where it says so.
+pub(super) fn bind_group_layout(
+    device: &wgpu::Device,
+    label: &str,
+    written: &[bool],
+) -> wgpu::BindGroupLayout {
+    let storage = written
+        .iter()
+        .map(|&written| wgpu::BufferBindingType::Storage { read_only: !written });
+    let types = std::iter::once(wgpu::BufferBindingType::Uniform).chain(storage);
     let entries: Vec<_> = (0..)
         .zip(types)
         .map(|(binding, ty)| entry(binding, ty))
         .collect();
     device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-        label: Some("drive"),
+        label: Some(label),
         entries: &entries,
     })
 }

@@ -1,4 +1,4 @@
-//! What the kernels read, as it lies in the adapter's memory: `shared.wgsl` field by field.
+//! What the kernels read, as it lies in the adapter's memory: the structures of `shared.wgsl` and `tape.wgsl` field by field.
 
 use bytemuck::{Pod, Zeroable};
 use effigy_registration::smpl::JOINT_COUNT;
@@ -22,6 +22,20 @@ pub(super) struct PoseBlock {
     pub(super) trans_m: Vec3,
     pub(super) longest: f32,
     pub(super) bones: [Rows; JOINT_COUNT],
+}
+
+/// `Batch` of `tape.wgsl`.
+#[derive(Clone, Copy, Pod, Zeroable)]
+#[repr(C)]
+pub(super) struct BatchBlock {
+    pub(super) tiles: u32,
+    pub(super) sines: u32,
+    pub(super) field_len: u32,
+    pub(super) points_at: u32,
+    pub(super) bars_at: u32,
+    pub(super) parameters: u32,
+    pub(super) gradients_at: u32,
+    pub(super) unused: u32,
 }
 
 /// `Vertex`.
@@ -105,8 +119,34 @@ pub(super) fn packed_len(config: SirenConfig) -> usize {
 /// First layer: a unit's weights and its bias. Hidden layers: the weights of each four inputs for all units, then the
 /// biases. Last layer: its weights, then its bias and three zeros.
 pub(super) fn pack(field: &SirenField, packed: &mut Vec<f32>) {
-    let (config, parameters) = (field.config(), field.parameters());
     packed.clear();
+    pack_layers(field.config(), field.parameters(), packed, |_, _| {});
+}
+
+/// Numbers of a field that is packed for learning.
+pub(super) fn packed_for_learning_len(config: SirenConfig) -> usize {
+    let SirenConfig { hidden, layers } = config;
+    packed_len(config) + (layers - 2) * hidden * hidden
+}
+
+/// The same, added to what is there, with each hidden layer's weights once more behind its biases, turned: what goes back
+/// through a layer multiplies with these.
+pub(super) fn pack_for_learning(config: SirenConfig, parameters: &[f32], packed: &mut Vec<f32>) {
+    pack_layers(config, parameters, packed, |weight, packed| {
+        for four in weight.chunks_exact(4 * config.hidden) {
+            for input in 0..config.hidden {
+                packed.extend((0..4).map(|row| four[row * config.hidden + input]));
+            }
+        }
+    });
+}
+
+fn pack_layers(
+    config: SirenConfig,
+    parameters: &[f32],
+    packed: &mut Vec<f32>,
+    behind_biases: impl Fn(&[f32], &mut Vec<f32>),
+) {
     let (weight, bias) = config.split(parameters, 0);
     for (weight, bias) in weight.chunks_exact(3).zip(bias) {
         packed.extend([weight[0], weight[1], weight[2], *bias]);
@@ -119,6 +159,7 @@ pub(super) fn pack(field: &SirenField, packed: &mut Vec<f32>) {
             }
         }
         packed.extend_from_slice(bias);
+        behind_biases(weight, packed);
     }
     let (weight, bias) = config.split(parameters, config.layers - 1);
     packed.extend_from_slice(weight);

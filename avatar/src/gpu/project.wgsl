@@ -1,15 +1,7 @@
 // Twin of `Driver::project_along_normals`: each workgroup takes a tile of vertices onto the zero level.
 //
-// An invocation is a unit of every hidden layer, HIDDEN in all; the first TILE of them own a vertex each. All weights are
-// read once for a tile, side by side; activations never leave the workgroup.
+// The first TILE of its invocations own a vertex each; activations never leave the workgroup.
 
-const OMEGA = 30.0;
-const QUARTER = HIDDEN / 4u;
-
-// One unit's outputs at all points of the tile.
-var<workgroup> activations: array<Tile, HIDDEN>;
-// With a one behind, for the bias.
-var<workgroup> points: array<vec4f, TILE>;
 var<workgroup> parts: array<f32, HIDDEN>;
 var<workgroup> is_open: array<u32, TILE>;
 var<workgroup> open_count: u32;
@@ -74,14 +66,7 @@ fn value_at_own_point(unit: u32) -> f32 {
     var layer_at = HIDDEN;
     for (var layer = 2u; layer < pose.layers; layer++) {
         let bias_at = layer_at + QUARTER * HIDDEN;
-        var z = filled(field[bias_at + unit / 4u][unit % 4u]);
-        for (var k = 0u; k < QUARTER; k++) {
-            let weight = field[layer_at + k * HIDDEN + unit];
-            z += weight.x * activations[4u * k];
-            z += weight.y * activations[4u * k + 1u];
-            z += weight.z * activations[4u * k + 2u];
-            z += weight.w * activations[4u * k + 3u];
-        }
+        let z = product(layer_at, unit, filled(field[bias_at + unit / 4u][unit % 4u]));
         workgroupBarrier();
         activations[unit] = sines(OMEGA * z);
         workgroupBarrier();
@@ -108,13 +93,4 @@ fn last_layer(unit: u32, layer_at: u32) -> f32 {
         }
     }
     return value;
-}
-
-fn products_with_four(weight: vec4f, first: u32) -> vec4f {
-    return vec4f(
-        dot(weight, points[first]),
-        dot(weight, points[first + 1u]),
-        dot(weight, points[first + 2u]),
-        dot(weight, points[first + 3u]),
-    );
 }

@@ -25,3 +25,16 @@ fn sines(angles_rad: Tile) -> Tile {
         sine(angles_rad[3]),
     );
 }
+
+fn cosines(angles_rad: Tile) -> Tile {
+    return Tile(
+        cosine(angles_rad[0]),
+        cosine(angles_rad[1]),
+        cosine(angles_rad[2]),
+        cosine(angles_rad[3]),
+    );
+}
+
+fn times(a: Tile, b: Tile) -> Tile {
+    return Tile(a[0] * b[0], a[1] * b[1], a[2] * b[2], a[3] * b[3]);
+}

@@ -15,3 +15,11 @@ fn products_with_points(weight: vec4f) -> Tile {
 fn sines(angles_rad: Tile) -> Tile {
     return Tile(sine(angles_rad[0]), sine(angles_rad[1]));
 }
+
+fn cosines(angles_rad: Tile) -> Tile {
+    return Tile(cosine(angles_rad[0]), cosine(angles_rad[1]));
+}
+
+fn times(a: Tile, b: Tile) -> Tile {
+    return Tile(a[0] * b[0], a[1] * b[1]);
+}

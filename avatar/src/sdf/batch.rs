@@ -132,7 +132,7 @@ fn sum_into_first(units: &mut [Unit]) {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use rand::{RngExt as _, SeedableRng as _, rngs::StdRng};
 
     use super::*;
@@ -143,7 +143,7 @@ mod tests {
     }
 
     /// A small network, and points of every kind: 150 of them, so that the last tile is not full.
-    fn example(config: SirenConfig) -> (SirenField, Vec<Vec3>, Vec<LossPoint>) {
+    pub(crate) fn example(config: SirenConfig) -> (SirenField, Vec<Vec3>, Vec<LossPoint>) {
         let mut rng = StdRng::seed_from_u64(5);
         let field = SirenField::init(config, &mut rng);
         let points: Vec<_> = (0..150).map(|_| random_point(&mut rng)).collect();

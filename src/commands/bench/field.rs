@@ -18,7 +18,7 @@ use glam::Vec3;
 use rand::{RngExt as _, SeedableRng as _, rngs::StdRng};
 use rayon::prelude::*;
 
-use super::{Row, in_turn::in_turn};
+use super::{Row, gpu, in_turn::in_turn};
 
 /// MetaAvatar's few-shot step.
 const FRAMES: usize = 8;
@@ -106,9 +106,13 @@ fn training(name: &str, config: HyperConfig, rounds: usize) -> anyhow::Result<Ve
         ..FineTuneConfig::default().without_code()
     };
     let (subject, samples) = keyframes(&mut rng)?;
-    let network = HyperNetwork::untrained(config, SEED);
     let metres_per_unit = subject.unit_box.metres_per_unit();
-    let mut tuner = FineTuner::new(network, &samples, metres_per_unit, &settings)?;
+    let made = || {
+        let network = HyperNetwork::untrained(config, SEED);
+        let tuner = FineTuner::new(network, &samples, metres_per_unit, &settings)?;
+        anyhow::Ok(tuner)
+    };
+    let mut tuner = made()?;
     let mut failed = None;
     let mut product = Product::new(config.field.hidden);
     let [field, whole, gemm] = in_turn(
@@ -126,12 +130,17 @@ fn training(name: &str, config: HyperConfig, rounds: usize) -> anyhow::Result<Ve
     }
     let gflop = 2.0 * config.field.training_multiply_adds() as f64 * (FRAMES * POINTS) as f64 / 1e9;
     let share = gflop / field / (product.gflop() / gemm);
-    Ok(vec![
+    let mut rows = vec![
         Row::new(format!("field step, {name}"), field * 1e3, "ms")
             .against("the matrix products' rate", share),
         Row::new(format!("fine-tuning step, {name}"), whole * 1e3, "ms")
             .against("its field part alone", field / whole),
-    ])
+    ];
+    // Two more of the paper's size would be the most memory of the whole run.
+    if config == HyperConfig::LIVE {
+        rows.extend(gpu::step_rows(name, &made, rounds)?);
+    }
+    Ok(rows)
 }
 
 /// Keyframes of a ball: what a step takes does not depend on what is learned.

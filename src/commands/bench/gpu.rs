@@ -1,9 +1,10 @@
-//! The drive on a graphics card, in turn with the processor's, and how far the two are apart.
+//! Drive and fine-tuning on a graphics card, in turn with the processor's, and how far the two are apart.
 
 use std::sync::Arc;
 
 use effigy_avatar::{
     Avatar, DriveConfig, Driver,
+    fine_tune::FineTuner,
     gpu::{Gpu, GpuDriver, GpuError},
 };
 use effigy_capture::FrameId;
@@ -20,6 +21,66 @@ const IN_SOFTWARE: usize = 3;
 /// Frames between two poses that are compared.
 const FRAMES_APART: usize = 37;
 
+/// A step of fine-tuning on this machine's fastest adapter, and what as many steps as were timed come to; `made` makes two
+/// tuners that are alike.
+pub(super) fn step_rows(
+    name: &str,
+    made: &dyn Fn() -> anyhow::Result<FineTuner>,
+    rounds: usize,
+) -> anyhow::Result<Vec<Row>> {
+    let Some(gpu) = card() else {
+        return Ok(Vec::new());
+    };
+    let (mut cpu, mut card) = (made()?, made()?);
+    card.lend(&gpu);
+    let rounds = if gpu.is_software() { 1 } else { rounds };
+    let mut failed = [Ok(()), Ok(())];
+    let [of_cpu, of_card] = &mut failed;
+    let [by_cpu, by_card] = in_turn(
+        rounds,
+        [
+            &mut || {
+                *of_cpu = cpu.step().map(drop);
+            },
+            &mut || {
+                *of_card = card.step().map(drop);
+            },
+        ],
+    );
+    // What ends in an error once does so each time.
+    failed.into_iter().collect::<Result<(), _>>()?;
+    if let Some(reason) = card.gave_up() {
+        eprintln!("effigy: no rows about fine-tuning on a graphics card: {reason}");
+        return Ok(Vec::new());
+    }
+    let name = format!("fine-tuning step, {name}, on {}{}", gpu.name(), kind(&gpu));
+    let apart = card.held_out_residual_m() / cpu.held_out_residual_m() - 1.0;
+    Ok(vec![
+        Row::new(name.clone(), by_card * 1e3, "ms").against("the processor", by_cpu / by_card),
+        Row::new(
+            format!("{name}, off the processor's in what is held out"),
+            f64::from(apart.abs()) * 1e6,
+            "parts in a million",
+        ),
+    ])
+}
+
+/// This machine's fastest adapter, or nothing but its reason.
+fn card() -> Option<Arc<Gpu>> {
+    Gpu::of_this_machine()
+        .inspect_err(|reason| eprintln!("effigy: no rows about a graphics card: {reason}"))
+        .ok()
+        .map(Arc::new)
+}
+
+fn kind(gpu: &Gpu) -> &'static str {
+    if gpu.is_software() {
+        " (in software)"
+    } else {
+        ""
+    }
+}
+
 /// On this machine's fastest adapter, with the avatar's own vertices and with more than three times as many; an adapter in
 /// software is measured too, and says so in its rows.
 pub(super) fn rows(
@@ -28,12 +89,8 @@ pub(super) fn rows(
     params: &dyn Fn(usize) -> BodyParams,
     quick: bool,
 ) -> anyhow::Result<Vec<Row>> {
-    let gpu = match Gpu::of_this_machine() {
-        Ok(gpu) => Arc::new(gpu),
-        Err(reason) => {
-            eprintln!("effigy: no rows about a graphics card: {reason}");
-            return Ok(Vec::new());
-        }
+    let Some(gpu) = card() else {
+        return Ok(Vec::new());
     };
     let mut avatars = vec![Arc::clone(own)];
     if !quick {
@@ -95,13 +152,8 @@ fn rows_of(
         ],
     );
     failed?;
-    let kind = if gpu.is_software() {
-        " (in software)"
-    } else {
-        ""
-    };
     let vertices = avatar.topology.vertices_in_unit.len();
-    let name = format!("drive on {}{kind}, {vertices} vertices", gpu.name());
+    let name = format!("drive on {}{}, {vertices} vertices", gpu.name(), kind(gpu));
     let off = |share: usize| differences_mm[(differences_mm.len() - 1) * share / 100];
     Ok(vec![
         Row::new(name.clone(), by_card.recip(), "poses/s")

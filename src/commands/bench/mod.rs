@@ -4,7 +4,7 @@ mod chain;
 mod drive;
 mod field;
 mod fusion;
-#[cfg_attr(not(feature = "gpu-drive"), path = "no_gpu.rs")]
+#[cfg_attr(not(feature = "gpu"), path = "no_gpu.rs")]
 mod gpu;
 mod in_turn;
 

@@ -1,6 +1,7 @@
 //! The kernels against their twins on the processor, on whatever adapter there is; without one these tests are skipped.
 
 mod faults;
+mod learn;
 mod sine;
 
 use std::sync::Arc;
