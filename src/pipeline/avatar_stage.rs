@@ -23,7 +23,6 @@ pub(crate) struct AvatarStage {
     body: Arc<BodyModel>,
     camera: CameraModel,
     settings: Settings,
-    devices: Devices,
     schedule: Schedule,
     clock: Clock,
     selector: KeyframeSelector,
@@ -43,6 +42,8 @@ pub(crate) struct AvatarStage {
     /// One entry an avatar, the first one first.
     figures: Vec<JobFigures>,
     pub(crate) timings: Timings,
+    /// Last: whoever goes before it no longer uses a card.
+    devices: Devices,
 }
 
 struct Making {
@@ -357,6 +358,9 @@ impl AvatarStage {
             return Ok(());
         };
         let FinishedAvatar { driver, figures } = finished?;
+        if figures.gave_up.is_some() {
+            self.devices.learn_without_card();
+        }
         self.learned_from.extend(&keyframes);
         self.figures.push(figures);
         let driver = self.devices.driver(driver, &self.clock);

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     clock::Clock,
-    graphics_card::{GraphicsCard, LentCard},
+    graphics_card::{GraphicsCard, LentCard, Purpose},
     schedule::Schedule,
 };
 
@@ -29,18 +29,17 @@ pub(crate) enum ComputeOn {
     Gpu,
 }
 
-/// What avatars are driven with and learned with from now on.
-pub(crate) struct Devices {
-    card: GraphicsCard,
-    drive: ComputeOn,
-    learn: ComputeOn,
-}
-
 /// Who wants a graphics card, and what for.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Wishes {
     pub(crate) drive: ComputeOn,
     pub(crate) learn: ComputeOn,
+}
+
+/// What avatars are driven with and learned with from now on.
+pub(crate) struct Devices {
+    drive: GraphicsCard,
+    learn: GraphicsCard,
 }
 
 impl Devices {
@@ -51,36 +50,37 @@ impl Devices {
         window: Option<&SnapshotSlot>,
     ) -> anyhow::Result<Self> {
         let is_live = matches!(schedule, Schedule::WhenReady);
-        let settled = |wish| match wish {
-            ComputeOn::Auto if !is_live => ComputeOn::Cpu,
-            wish => wish,
+        let card = |wish, purpose| match wish {
+            ComputeOn::Gpu => GraphicsCard::open(purpose, window),
+            ComputeOn::Auto if is_live => GraphicsCard::look_for(purpose, window),
+            ComputeOn::Auto | ComputeOn::Cpu => Ok(GraphicsCard::none()),
         };
-        let (drive, learn) = (settled(wishes.drive), settled(wishes.learn));
-        let either = |wish| drive == wish || learn == wish;
-        let card = if either(ComputeOn::Gpu) {
-            GraphicsCard::open(window)?
-        } else if either(ComputeOn::Auto) {
-            GraphicsCard::look_for(window)?
-        } else {
-            GraphicsCard::none()
-        };
-        Ok(Self { card, drive, learn })
+        Ok(Self {
+            drive: card(wishes.drive, Purpose::Drive)?,
+            learn: card(wishes.learn, Purpose::Learn)?,
+        })
     }
 
     /// `clock` tells whether a card that nobody asked for is worth it.
     pub(crate) fn driver(&mut self, cpu: Driver, clock: &Clock) -> LiveDriver {
-        match self.drive {
-            ComputeOn::Cpu => LiveDriver::on_cpu(cpu),
-            wish => self.card.driver(cpu, wish == ComputeOn::Auto, clock),
-        }
+        self.drive.driver(cpu, clock)
     }
 
     /// What an avatar may be learned with; not a card that is still being opened: the next avatar can have it.
     pub(crate) fn card_to_learn_with(&mut self) -> LentCard {
-        match self.learn {
-            ComputeOn::Cpu => LentCard::none(),
-            wish => self.card.lent(wish == ComputeOn::Auto),
-        }
+        self.learn.lent()
+    }
+
+    /// The card gave up, or was given up: avatars are learned without it from now on.
+    pub(crate) fn learn_without_card(&mut self) {
+        self.learn.give_up();
+    }
+}
+
+impl Drop for Devices {
+    /// Nobody may be inside a graphics driver when the program ends.
+    fn drop(&mut self) {
+        self.learn.wait_for_borrowers();
     }
 }
 
@@ -107,8 +107,9 @@ mod tests {
             (ComputeOn::Cpu, Schedule::WhenReady),
         ] {
             let wishes = Wishes { drive: wish, learn: wish };
-            let device = Devices::choose(wishes, &schedule, None).unwrap();
-            assert!(device.card.is_none(), "{wish:?}, {schedule:?}");
+            let devices = Devices::choose(wishes, &schedule, None).unwrap();
+            let none = devices.drive.is_none() && devices.learn.is_none();
+            assert!(none, "{wish:?}, {schedule:?}");
         }
     }
 }

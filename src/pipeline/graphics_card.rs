@@ -1,9 +1,10 @@
-//! A graphics card that drives avatars and learns them. Opening one takes tenths of a second, which the first frames need
-//! not wait for.
+//! A graphics card that drives avatars or learns them, each on a device of its own: what fails in learning does not stop
+//! the drive, and a pose waits for no step. Opening one takes tenths of a second, which the first frames need not wait for.
 
 use std::{
     sync::Arc,
     thread::{self, JoinHandle},
+    time::Duration,
 };
 
 use anyhow::Context as _;
@@ -19,27 +20,29 @@ use effigy_viewer::SnapshotSlot;
 
 use super::clock::Clock;
 
+/// What a card is wanted for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Purpose {
+    Drive,
+    Learn,
+}
+
 /// Open, being opened until the first avatar asks for it, or none.
 #[derive(Default)]
 pub(crate) struct GraphicsCard {
     opening: Option<JoinHandle<Option<Arc<Gpu>>>>,
     gpu: Option<Arc<Gpu>>,
-    /// Whether it has shown what it drives like.
-    has_driven: bool,
+    /// Whether nobody asked for it by name, so that it has to be worth it.
+    on_trial: bool,
 }
 
 /// A card for somebody to learn with, or none.
-#[derive(Clone, Default)]
 pub(crate) struct LentCard {
     gpu: Option<Arc<Gpu>>,
     on_trial: bool,
 }
 
 impl LentCard {
-    pub(crate) fn none() -> Self {
-        Self::default()
-    }
-
     /// Has steps computed on the card, if there is one; one on trial only if it is right and faster than the processor.
     pub(crate) fn help(&self, tuner: &mut FineTuner, clock: &Clock) {
         if let Some(gpu) = &self.gpu {
@@ -70,21 +73,28 @@ impl GraphicsCard {
     }
 
     /// Any adapter, opened here and now; it is an error if there is none.
-    pub(crate) fn open(window: Option<&SnapshotSlot>) -> anyhow::Result<Self> {
-        let gpu = opener(window)().and_then(prepared).context(
-            "drive.device or learn.device is \"gpu\" (\"auto\" would go on without one)",
-        )?;
-        Ok(Self { opening: None, gpu: Some(gpu), has_driven: false })
+    pub(crate) fn open(purpose: Purpose, window: Option<&SnapshotSlot>) -> anyhow::Result<Self> {
+        let setting = match purpose {
+            Purpose::Drive => "drive.device",
+            Purpose::Learn => "learn.device",
+        };
+        let gpu = opener(window)()
+            .and_then(|gpu| prepared(gpu, purpose))
+            .with_context(|| format!("{setting} is \"gpu\" (\"auto\" would go on without one)"))?;
+        Ok(Self { opening: None, gpu: Some(gpu), on_trial: false })
     }
 
     /// One that is worth it, if there is one.
-    pub(crate) fn look_for(window: Option<&SnapshotSlot>) -> anyhow::Result<Self> {
+    pub(crate) fn look_for(
+        purpose: Purpose,
+        window: Option<&SnapshotSlot>,
+    ) -> anyhow::Result<Self> {
         let open = opener(window);
         let thread = thread::Builder::new()
             .name("graphics card".to_owned())
-            .spawn(move || worth_it(open()))
+            .spawn(move || worth_it(open(), purpose))
             .context("cannot start the thread that opens the graphics card")?;
-        Ok(Self { opening: Some(thread), gpu: None, has_driven: false })
+        Ok(Self { opening: Some(thread), gpu: None, on_trial: true })
     }
 
     #[cfg(test)]
@@ -92,25 +102,45 @@ impl GraphicsCard {
         self.opening.is_none() && self.gpu.is_none()
     }
 
-    /// On the card, which the first time is on trial if nobody asked for it by name. Does not wait for a card that is
-    /// still being opened: the next avatar can have it.
-    pub(crate) fn driver(&mut self, cpu: Driver, on_trial: bool, clock: &Clock) -> LiveDriver {
+    /// Does not wait for a card that is still being opened: the next avatar can have it.
+    pub(crate) fn driver(&mut self, cpu: Driver, clock: &Clock) -> LiveDriver {
         let Some(gpu) = self.opened() else {
             return LiveDriver::on_cpu(cpu);
         };
         let mut driver = LiveDriver::on_gpu(cpu, &gpu);
-        if on_trial && !self.has_driven && driver.gave_up().is_none() {
+        if self.on_trial && driver.gave_up().is_none() {
             try_out(&mut driver, gpu.name(), clock);
             if driver.gave_up().is_some() {
                 self.gpu = None;
             }
-            self.has_driven = true;
+            self.on_trial = false;
         }
         driver
     }
 
-    pub(crate) fn lent(&mut self, on_trial: bool) -> LentCard {
-        LentCard { gpu: self.opened(), on_trial }
+    /// Nor does this. A card on trial is tried for each avatar: what the processor is busy with changes.
+    pub(crate) fn lent(&mut self) -> LentCard {
+        LentCard { gpu: self.opened(), on_trial: self.on_trial }
+    }
+
+    /// It was given up: nobody gets it any more.
+    pub(crate) fn give_up(&mut self) {
+        self.gpu = None;
+    }
+
+    /// Returns when nobody has the card any more whom it was lent to; whoever was told to stop does so after a step.
+    pub(crate) fn wait_for_borrowers(&self) {
+        const LOOK_EVERY: Duration = Duration::from_millis(2);
+        /// One that hangs must not keep the program from ending.
+        const MOST_LOOKS: usize = 1000;
+        if let Some(gpu) = &self.gpu {
+            for _ in 0..MOST_LOOKS {
+                if Arc::strong_count(gpu) == 1 {
+                    break;
+                }
+                thread::sleep(LOOK_EVERY);
+            }
+        }
     }
 
     fn opened(&mut self) -> Option<Arc<Gpu>> {
@@ -187,21 +217,25 @@ fn opener(_: Option<&SnapshotSlot>) -> fn() -> Result<Gpu, GpuError> {
     Gpu::of_this_machine
 }
 
-fn prepared(gpu: Gpu) -> Result<Arc<Gpu>, GpuError> {
-    gpu.prepare(SirenConfig::LIVE.hidden)?;
+fn prepared(gpu: Gpu, purpose: Purpose) -> Result<Arc<Gpu>, GpuError> {
+    let hidden = SirenConfig::LIVE.hidden;
+    match purpose {
+        Purpose::Drive => gpu.prepare_to_drive(hidden)?,
+        Purpose::Learn => gpu.prepare_to_learn(hidden)?,
+    }
     Ok(Arc::new(gpu))
 }
 
 /// What nobody asked for by name must be more than the processor in disguise.
-fn worth_it(opened: Result<Gpu, GpuError>) -> Option<Arc<Gpu>> {
+fn worth_it(opened: Result<Gpu, GpuError>, purpose: Purpose) -> Option<Arc<Gpu>> {
     let gpu = opened.and_then(|gpu| {
         if gpu.is_software() {
-            tracing::info!(adapter = gpu.name(), "in software: the processor drives");
+            tracing::info!(?purpose, adapter = gpu.name(), "in software: left alone");
             return Ok(None);
         }
-        prepared(gpu).map(Some)
+        prepared(gpu, purpose).map(Some)
     });
-    gpu.inspect_err(|reason| tracing::info!(%reason, "the processor drives"))
+    gpu.inspect_err(|reason| tracing::info!(?purpose, %reason, "no graphics card"))
         .ok()
         .flatten()
 }
@@ -236,17 +270,17 @@ mod tests {
             }
         };
         let clock = Clock::start();
-        let open =
-            || GraphicsCard { opening: None, gpu: Some(Arc::clone(&gpu)), has_driven: false };
+        let named =
+            |on_trial| GraphicsCard { opening: None, gpu: Some(Arc::clone(&gpu)), on_trial };
         let by_card = format!("{}, full field", gpu.name());
-        let asked_for = open().driver(driver(), false, &clock);
+        let asked_for = named(false).driver(driver(), &clock);
         assert_eq!(
             (asked_for.device(), asked_for.gave_up()),
             (by_card.clone(), None)
         );
 
-        let mut card = open();
-        let tried = card.driver(driver(), true, &clock);
+        let mut card = named(true);
+        let tried = card.driver(driver(), &clock);
         println!("{}, {:?}", tried.device(), tried.gave_up());
         assert_eq!(tried.gave_up().is_some(), card.gpu.is_none());
         match tried.gave_up() {
@@ -258,6 +292,26 @@ mod tests {
         }
         // Four thousand vertices take the processor a tenth of a second if it has to play the card.
         assert!(!gpu.is_software() || tried.gave_up().is_some());
-        assert_eq!(card.driver(driver(), true, &clock).device(), tried.device());
+        assert_eq!(card.driver(driver(), &clock).device(), tried.device());
+    }
+
+    #[test]
+    fn a_card_is_waited_for_until_whoever_learns_with_it_is_done() {
+        let Ok(gpu) = Gpu::of_this_machine() else {
+            return;
+        };
+        let mut card = GraphicsCard { opening: None, gpu: Some(Arc::new(gpu)), on_trial: false };
+        let lent = card.lent();
+        let clock = Clock::start();
+        let work = Duration::from_millis(50);
+        let job = thread::Builder::new()
+            .name("learns".to_owned())
+            .spawn(move || {
+                thread::sleep(work);
+                drop(lent);
+            });
+        card.wait_for_borrowers();
+        assert!(clock.secs() >= work.as_secs_f64());
+        job.unwrap().join().unwrap();
     }
 }

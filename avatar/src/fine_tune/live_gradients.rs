@@ -75,32 +75,26 @@ impl LiveGradients {
         loss: &LossConfig,
         clock: &dyn Fn() -> f64,
     ) {
-        let started = clock();
-        self.cpu.compute(frames, loss);
-        let cpu_secs = clock() - started;
-        // The first time buffers are made, and some drivers finish compiling.
-        let mut gpu_secs = f64::INFINITY;
-        for _ in 0..2 {
-            let started = clock();
-            self.compute(frames, loss);
-            gpu_secs = clock() - started;
-        }
-        let Some(gpu) = &self.gpu else {
+        let Some(gpu) = &mut self.gpu else {
             return;
         };
-        let name = gpu.gpu().name();
+        // The first time buffers are made on both sides, and some drivers finish compiling.
+        let (mut cpu_secs, mut gpu_secs) = (f64::INFINITY, f64::INFINITY);
+        for _ in 0..2 {
+            let started = clock();
+            self.cpu.compute(frames, loss);
+            let between = clock();
+            if let Err(reason) = gpu.compute(frames, loss) {
+                self.give_up(reason.to_string());
+                return;
+            }
+            cpu_secs = cpu_secs.min(between - started);
+            gpu_secs = gpu_secs.min(clock() - between);
+        }
         let pairs = (0..frames.len()).map(|frame| (gpu.frame(frame), self.cpu.frame(frame)));
         let off = relative_difference(pairs);
-        // Not a number is no good either.
-        let is_same = off <= MOST_OFF;
-        if !is_same {
-            let percent = off * 100.0;
-            let reason = format!("{name} has gradients {percent:.1} % off the processor's");
-            self.give_up(reason);
-        } else if gpu_secs > cpu_secs {
-            let [gpu_ms, cpu_ms] = [gpu_secs, cpu_secs].map(|secs| secs * 1e3);
-            let reason = format!("{name} takes {gpu_ms:.1} ms a step, the processor {cpu_ms:.1}");
-            self.give_up(reason);
+        if let Some(objection) = objection(off, gpu_secs, cpu_secs) {
+            self.give_up(format!("{} {objection}", self.device));
         }
     }
 
@@ -123,6 +117,21 @@ impl LiveGradients {
     }
 }
 
+/// What there is to say against a device whose gradients are `off` the processor's by that share.
+#[cfg(feature = "gpu")]
+fn objection(off: f64, gpu_secs: f64, cpu_secs: f64) -> Option<String> {
+    // What is no number is not within anything.
+    let is_same = off <= MOST_OFF;
+    if !is_same {
+        return Some(format!(
+            "has gradients {:.1} % off the processor's",
+            off * 100.0
+        ));
+    }
+    let [gpu_ms, cpu_ms] = [gpu_secs, cpu_secs].map(|secs| secs * 1e3);
+    (gpu_secs > cpu_secs).then(|| format!("takes {gpu_ms:.1} ms a step, the processor {cpu_ms:.1}"))
+}
+
 /// Single precision, summed in another order, comes to a thousandth of that.
 #[cfg(feature = "gpu")]
 const MOST_OFF: f64 = 0.01;
@@ -135,5 +144,37 @@ fn relative_difference<'a>(pairs: impl Iterator<Item = (&'a [f32], &'a [f32])>) 
         difference += f64::from(ours - twin).powi(2);
         length += f64::from(*twin).powi(2);
     }
+    // Where nothing weighs anything both are zero, and the same.
+    if difference == 0.0 {
+        return 0.0;
+    }
     (difference / length).sqrt()
+}
+
+#[cfg(all(test, feature = "gpu"))]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_device_is_objected_to_where_it_is_wrong_or_slow() {
+        assert_eq!(objection(1e-5, 0.01, 0.04), None);
+        for (off, says) in [(0.02, "2.0 % off"), (f64::NAN, "NaN % off")] {
+            let reason = objection(off, 0.01, 0.04).unwrap();
+            assert!(reason.contains(says), "{reason}");
+        }
+        let reason = objection(1e-5, 0.05, 0.04).unwrap();
+        assert!(
+            reason.contains("50.0 ms a step, the processor 40.0"),
+            "{reason}"
+        );
+    }
+
+    #[test]
+    fn a_difference_is_measured_by_the_twins_length_over_all_frames() {
+        let off = |pairs: &[(&[f32], &[f32])]| relative_difference(pairs.iter().copied());
+        assert_eq!(off(&[(&[3.0, 1.0], &[3.0, 0.0]), (&[4.0], &[4.0])]), 0.2);
+        assert_eq!(off(&[(&[0.0], &[0.0])]), 0.0);
+        assert!(off(&[(&[f32::NAN], &[1.0])]).is_nan());
+        assert_eq!(off(&[(&[1.0], &[0.0])]), f64::INFINITY);
+    }
 }

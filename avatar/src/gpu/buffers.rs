@@ -68,7 +68,8 @@ pub(super) fn read_back<R>(
     let waited = gpu.device.poll(wait);
     gpu.check()?;
     waited.map_err(|error| gave_no_answer(gpu, &error))?;
-    match told.try_recv() {
+    // Whoever polls or submits on another thread may be the one that calls.
+    match told.recv_timeout(PATIENCE) {
         Ok(Ok(())) => {}
         Ok(Err(error)) => return Err(gpu.failed(&error)),
         Err(_) => return Err(gpu.failed(&"what it computed cannot be read")),

@@ -5,7 +5,7 @@ use std::{
     sync::{Arc, Mutex, OnceLock, PoisonError},
 };
 
-use super::{error::GpuError, kernels::Kernels};
+use super::{error::GpuError, kernels::Kernels, learner::LearnKernels};
 
 /// A device of our own: what fails on it fails nobody else, and its errors come here.
 pub struct Gpu {
@@ -16,6 +16,7 @@ pub struct Gpu {
     first_fault: Arc<OnceLock<GpuError>>,
     /// Those that were asked for last: avatars of one prior share them.
     kernels: Mutex<Option<Arc<Kernels>>>,
+    learn_kernels: Mutex<Option<Arc<LearnKernels>>>,
 }
 
 impl Gpu {
@@ -43,7 +44,7 @@ impl Gpu {
             return Err(GpuError::Backend { adapter: name, backend: info.backend.to_string() });
         }
         let descriptor = wgpu::DeviceDescriptor {
-            label: Some("drive"),
+            label: Some("effigy"),
             required_limits: limits(&adapter.limits()),
             memory_hints: wgpu::MemoryHints::MemoryUsage,
             ..wgpu::DeviceDescriptor::default()
@@ -61,6 +62,7 @@ impl Gpu {
             is_software: info.device_type == wgpu::DeviceType::Cpu,
             first_fault,
             kernels: Mutex::default(),
+            learn_kernels: Mutex::default(),
         })
     }
 
@@ -74,19 +76,26 @@ impl Gpu {
         self.is_software
     }
 
-    /// Compiles what fields so wide need, so that the first avatar need not wait for it.
-    pub fn prepare(&self, hidden: usize) -> Result<(), GpuError> {
+    /// Compiles what driving fields so wide needs, so that the first avatar need not wait for it.
+    pub fn prepare_to_drive(&self, hidden: usize) -> Result<(), GpuError> {
         self.kernels(hidden).map(drop)
     }
 
+    /// The same for learning them.
+    pub fn prepare_to_learn(&self, hidden: usize) -> Result<(), GpuError> {
+        self.learn_kernels(hidden).map(drop)
+    }
+
     pub(super) fn kernels(&self, hidden: usize) -> Result<Arc<Kernels>, GpuError> {
-        let mut kept = self.kernels.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(kernels) = kept.as_ref().filter(|kernels| kernels.hidden == hidden) {
-            return Ok(Arc::clone(kernels));
-        }
-        let kernels = Arc::new(Kernels::new(self, hidden)?);
-        *kept = Some(Arc::clone(&kernels));
-        Ok(kernels)
+        let is_fit = |kernels: &Kernels| kernels.hidden == hidden;
+        kept(&self.kernels, is_fit, || Kernels::new(self, hidden))
+    }
+
+    pub(super) fn learn_kernels(&self, hidden: usize) -> Result<Arc<LearnKernels>, GpuError> {
+        let is_fit = |kernels: &LearnKernels| kernels.hidden == hidden;
+        kept(&self.learn_kernels, is_fit, || {
+            LearnKernels::new(self, hidden)
+        })
     }
 
     /// The first thing that went wrong with the device, if anything did.
@@ -102,6 +111,21 @@ impl Gpu {
     pub(super) fn failed(&self, why: &impl fmt::Display) -> GpuError {
         GpuError::Failed { adapter: self.name.clone(), why: on_one_line(why) }
     }
+}
+
+/// What was asked for last, if it fits; otherwise it is made.
+fn kept<K>(
+    last: &Mutex<Option<Arc<K>>>,
+    is_fit: impl Fn(&K) -> bool,
+    make: impl FnOnce() -> Result<K, GpuError>,
+) -> Result<Arc<K>, GpuError> {
+    let mut last = last.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some(kept) = last.as_ref().filter(|kept| is_fit(kept)) {
+        return Ok(Arc::clone(kept));
+    }
+    let made = Arc::new(make()?);
+    *last = Some(Arc::clone(&made));
+    Ok(made)
 }
 
 /// Errors that nobody catches would end the program.

@@ -1,4 +1,4 @@
-//! Why a graphics card does not drive an avatar.
+//! Why a graphics card does not drive an avatar, or learn it.
 
 use crate::sdf::SirenConfig;
 

@@ -25,7 +25,7 @@ pub(super) struct Kernels {
     pub(super) normals: wgpu::ComputePipeline,
 }
 
-/// How many vertices a workgroup takes to the zero level together.
+/// How many points a workgroup takes through the field together.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Tile {
     Of16,
@@ -48,14 +48,9 @@ impl Tile {
     }
 
     /// What `project.wgsl` keeps in a workgroup: activations, points, parts of sums, flags and their count.
-    fn workgroup_bytes(self, hidden: u32) -> u32 {
+    pub(super) fn workgroup_bytes(self, hidden: u32) -> u32 {
         let points = self.points();
         4 * (hidden * points + 4 * points + hidden + points) + 16
-    }
-
-    /// The larger one that fits.
-    pub(super) fn for_width(hidden: u32, allowed_bytes: u32) -> Option<Self> {
-        Self::that_takes(|tile| tile.workgroup_bytes(hidden), allowed_bytes)
     }
 
     /// The larger one that takes no more than is allowed.
@@ -68,33 +63,10 @@ impl Tile {
 
 impl Kernels {
     pub(super) fn new(gpu: &Gpu, hidden: usize) -> Result<Self, GpuError> {
-        let limits = gpu.device.limits();
         let width = hidden as u32;
-        let invocations = limits
-            .max_compute_invocations_per_workgroup
-            .min(limits.max_compute_workgroup_size_x);
-        let storage_bytes = limits.max_compute_workgroup_storage_size;
-        let tile = Tile::for_width(width, storage_bytes);
-        for (what, needed, allowed) in [
-            (
-                "invocations in a workgroup",
-                width.max(SKIN_GROUP),
-                invocations,
-            ),
-            (
-                "storage buffers for a shader",
-                STORAGE_BUFFERS,
-                limits.max_storage_buffers_per_shader_stage,
-            ),
-            (
-                "bytes of a workgroup's own memory",
-                Tile::Of8.workgroup_bytes(width),
-                storage_bytes,
-            ),
-        ] {
-            at_most(gpu, what, u64::from(needed), u64::from(allowed))?;
-        }
-        let tile = tile.unwrap_or(Tile::Of8);
+        let needed = |tile: Tile| tile.workgroup_bytes(width);
+        let invocations = width.max(SKIN_GROUP);
+        let tile = fitting_tile(gpu, (invocations, STORAGE_BUFFERS), needed)?;
         let layout = bind_group_layout(&gpu.device, "drive", &[false, false, true, false]);
         let project = format!(
             "const HIDDEN = {hidden}u;\n{SHARED}{SINE}{}{LAYER}{PROJECT}",
@@ -115,6 +87,39 @@ impl Kernels {
         gpu.check()?;
         Ok(kernels)
     }
+}
+
+/// The larger tile that leaves the adapter's limits alone; `needed` of a workgroup's own memory.
+pub(super) fn fitting_tile(
+    gpu: &Gpu,
+    (invocations, storage_buffers): (u32, u32),
+    needed: impl Fn(Tile) -> u32,
+) -> Result<Tile, GpuError> {
+    let limits = gpu.device.limits();
+    let allowed_invocations = limits
+        .max_compute_invocations_per_workgroup
+        .min(limits.max_compute_workgroup_size_x);
+    let allowed_bytes = limits.max_compute_workgroup_storage_size;
+    for (what, needed, allowed) in [
+        (
+            "invocations in a workgroup",
+            invocations,
+            allowed_invocations,
+        ),
+        (
+            "storage buffers for a shader",
+            storage_buffers,
+            limits.max_storage_buffers_per_shader_stage,
+        ),
+        (
+            "bytes of a workgroup's own memory",
+            needed(Tile::Of8),
+            allowed_bytes,
+        ),
+    ] {
+        at_most(gpu, what, u64::from(needed), u64::from(allowed))?;
+    }
+    Ok(Tile::that_takes(needed, allowed_bytes).unwrap_or(Tile::Of8))
 }
 
 /// Refuses fields of a shape that the kernels do not know.

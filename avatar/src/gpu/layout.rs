@@ -203,6 +203,31 @@ mod tests {
     }
 
     #[test]
+    fn a_field_to_learn_has_its_hidden_weights_once_more_turned() {
+        let config = SirenConfig { hidden: 16, layers: 4 };
+        let field = SirenField::init(config, &mut StdRng::seed_from_u64(3));
+        let (mut plain, mut packed) = (Vec::new(), Vec::new());
+        pack(&field, &mut plain);
+        pack_for_learning(config, field.parameters(), &mut packed);
+        assert_eq!(packed.len(), packed_for_learning_len(config));
+        let (square, hidden) = (16 * 16, 16);
+        let mut at = 4 * hidden;
+        for layer in 1..3 {
+            let turned = &packed[at + square + hidden..][..square];
+            let (weight, _) = config.split(field.parameters(), layer);
+            for unit in 0..hidden {
+                for input in 0..hidden {
+                    let place = 4 * (unit / 4 * hidden + input) + unit % 4;
+                    assert_eq!(turned[place], weight[unit * hidden + input]);
+                }
+            }
+            packed.drain(at + square + hidden..at + 2 * square + hidden);
+            at += square + hidden;
+        }
+        assert_eq!(packed, plain);
+    }
+
+    #[test]
     fn each_vertex_finds_its_triangles_in_their_order() {
         let triangles = [[0, 1, 2], [2, 1, 3], [4, 2, 0]];
         let fans = fans(6, &triangles);

@@ -1,8 +1,8 @@
 //! Loss and parameter gradients on a device: two sweeps of shaders, the loss between them on the processor.
 //!
 //! The twin of [`FieldGradients`](crate::sdf::batch::FieldGradients). A step takes fields and points up, each point's
-//! value and gradient down, the loss's derivatives by them up, and gradients by the parameters down: some 3 MB in all at
-//! the live size.
+//! value and gradient down, the loss's derivatives by them up, and gradients by the parameters down: 5 MB in all at the
+//! live size, of which the fields are 3, with their weights once more turned.
 
 use std::sync::Arc;
 
@@ -31,17 +31,20 @@ const OF_A_POINT: usize = 4;
 const A_POINT_BYTES: u64 = size_of::<[f32; OF_A_POINT]>() as u64;
 /// What a unit of a sine layer leaves on the tape: `KINDS` in `tape.wgsl`.
 const KINDS: usize = 5;
-/// Rows and columns of a weight that a workgroup of `hidden_weights` takes.
+/// Rows and columns of a weight that a workgroup of `hidden_weights` takes, four by four an invocation.
 const BLOCK: u32 = 32;
-/// Tiles that such a workgroup keeps.
-const FACTORS: u32 = 128;
+const SIDE: u32 = BLOCK / 4;
+/// Units of which such a workgroup keeps a tile: rows and columns twice.
+const FACTORS: u32 = 4 * BLOCK;
+/// What the shaders bind beside their uniform.
+const STORAGE_BUFFERS: u32 = 3;
 /// Where all frames' tapes take more than that, frames are taken in turn.
 const MOST_TAPE_BYTES: usize = 256 << 20;
 
-/// The compiled kernels for one shape of field.
-struct LearnKernels {
-    hidden: u32,
-    tile: Tile,
+/// The compiled kernels for fields of one width.
+pub(super) struct LearnKernels {
+    pub(super) hidden: usize,
+    pub(super) tile: Tile,
     layout: wgpu::BindGroupLayout,
     forward: wgpu::ComputePipeline,
     backward: wgpu::ComputePipeline,
@@ -54,10 +57,13 @@ struct LearnKernels {
 pub struct GpuGradients {
     gpu: Arc<Gpu>,
     config: SirenConfig,
-    kernels: LearnKernels,
+    pub(super) kernels: Arc<LearnKernels>,
     buffers: Option<Buffers>,
     pub(super) most_tape_bytes: usize,
-    packed: Vec<f32>,
+    /// Fields as they go up, [frames].
+    packed: Vec<Vec<f32>>,
+    /// Points as they go up, then the loss's derivatives at each.
+    of_points: Vec<[f32; OF_A_POINT]>,
     /// [frames][parameters]
     gradients: Vec<Vec<f32>>,
 }
@@ -98,12 +104,13 @@ impl GpuGradients {
         kernels::can_evaluate(config)?;
         gpu.check()?;
         Ok(Self {
-            kernels: LearnKernels::new(gpu, config.hidden)?,
+            kernels: gpu.learn_kernels(config.hidden)?,
             gpu: Arc::clone(gpu),
             config,
             buffers: None,
             most_tape_bytes: MOST_TAPE_BYTES,
             packed: Vec::new(),
+            of_points: Vec::new(),
             gradients: Vec::new(),
         })
     }
@@ -112,15 +119,19 @@ impl GpuGradients {
         &self.gpu
     }
 
-    /// The loss over all frames; leaves each frame's gradient in [`Self::frame`]. After an error neither this nor its
-    /// device is of any use any more.
+    /// The loss over all frames; leaves each frame's gradient in [`Self::frame`]. After an error this is of no use any
+    /// more, nor is its device unless it was too small.
     pub fn compute(
         &mut self,
         frames: &[FieldFrame<'_>],
         loss: &LossConfig,
     ) -> Result<LossTerms, GpuError> {
         let computed = self.computed(frames, loss);
-        computed.inspect_err(|error| self.gpu.remember(error))
+        computed.inspect_err(|error| {
+            if !matches!(error, GpuError::Limit { .. }) {
+                self.gpu.remember(error);
+            }
+        })
     }
 
     /// The loss's gradient by a frame's parameters, after [`Self::compute`].
@@ -178,15 +189,16 @@ impl GpuGradients {
         self.upload(buffers, frames);
         let found = self.sweep_forward(buffers, frames.len())?;
         let a_frame = buffers.size.points_a_frame();
-        let mut bars = vec![[0.0; OF_A_POINT]; buffers.size.points()];
+        self.of_points.fill([0.0; OF_A_POINT]);
         let terms: Vec<(LossTerms, f32)> = frames
             .par_iter()
             .zip(found.par_chunks(a_frame))
-            .zip(bars.par_chunks_mut(a_frame))
+            .zip(self.of_points.par_chunks_mut(a_frame))
             .map(|((frame, found), bars)| frame_loss(loss, scale, frame, found, bars))
             .collect();
         let gradients = &mut self.gradients[first..][..frames.len()];
-        sweep_backward((&self.gpu, &self.kernels), buffers, &bars, gradients)?;
+        let device = (&*self.gpu, &*self.kernels);
+        sweep_backward(device, buffers, &self.of_points, gradients)?;
         let mut sum = LossTerms::default();
         for ((terms, value_bars), gradient) in terms.into_iter().zip(gradients) {
             sum += terms;
@@ -199,21 +211,33 @@ impl GpuGradients {
     }
 
     fn upload(&mut self, buffers: &Buffers, frames: &[FieldFrame<'_>]) {
-        let size = buffers.size;
-        self.packed.clear();
-        for frame in frames {
-            layout::pack_for_learning(self.config, frame.parameters, &mut self.packed);
-        }
+        let (size, config) = (buffers.size, self.config);
+        self.packed.resize_with(size.frames, Vec::new);
+        self.of_points.clear();
+        self.of_points.resize(size.points(), [0.0, 0.0, 0.0, 1.0]);
+        let places = self.of_points.par_chunks_mut(size.points_a_frame());
+        frames
+            .par_iter()
+            .zip(self.packed.par_iter_mut().zip(places))
+            .for_each(|(frame, (packed, places))| {
+                packed.clear();
+                layout::pack_for_learning(config, frame.parameters, packed);
+                for (place, point) in places.iter_mut().zip(frame.points) {
+                    *place = point.extend(1.0).to_array();
+                }
+            });
         let queue = &self.gpu.queue;
-        queue.write_buffer(&buffers.field, 0, bytemuck::cast_slice(&self.packed));
-        let mut points = vec![[0.0, 0.0, 0.0, 1.0]; size.points()];
-        for (frame, points) in frames.iter().zip(points.chunks_mut(size.points_a_frame())) {
-            for (packed, point) in points.iter_mut().zip(frame.points) {
-                *packed = point.extend(1.0).to_array();
-            }
+        let field_bytes = u64::from(buffers.block.field_len) * A_POINT_BYTES;
+        for (number, packed) in (0..).zip(&self.packed[..frames.len()]) {
+            let at = number * field_bytes;
+            queue.write_buffer(&buffers.field, at, bytemuck::cast_slice(packed));
         }
         let points_at = u64::from(buffers.block.points_at) * A_POINT_BYTES;
-        queue.write_buffer(&buffers.field, points_at, bytemuck::cast_slice(&points));
+        queue.write_buffer(
+            &buffers.field,
+            points_at,
+            bytemuck::cast_slice(&self.of_points),
+        );
     }
 
     /// Each point's gradient and value.
@@ -273,7 +297,7 @@ fn sweep_backward(
     pass.dispatch_workgroups(size.tiles as u32, frames, 1);
     let hidden_layers = block.sines - 1;
     if hidden_layers > 0 {
-        let blocks = kernels.hidden.div_ceil(BLOCK);
+        let blocks = (kernels.hidden as u32).div_ceil(BLOCK);
         pass.set_pipeline(&kernels.hidden_weights);
         pass.dispatch_workgroups(blocks * blocks, hidden_layers, frames);
     }
@@ -284,13 +308,23 @@ fn sweep_backward(
     encoder.copy_buffer_to_buffer(found, points_bytes, readable, 0, readable.size());
     let submission = gpu.queue.submit([encoder.finish()]);
     let parameters = block.parameters as usize;
-    buffers::read_back(gpu, readable, submission, |bytes| {
+    let are_numbers = buffers::read_back(gpu, readable, submission, |bytes| {
         let frames = bytes.chunks_exact(parameters * size_of::<f32>());
+        let mut are_numbers = true;
         for (gradient, bytes) in gradients.iter_mut().zip(frames) {
             gradient.resize(parameters, 0.0);
             bytemuck::cast_slice_mut(gradient).copy_from_slice(bytes);
+            // The last bias is the processor's.
+            are_numbers &= gradient[..parameters - 1].iter().all(|x| x.is_finite());
         }
-    })
+        are_numbers
+    })?;
+    if are_numbers {
+        Ok(())
+    } else {
+        // The loss, from the sweep forward, may look well.
+        Err(gpu.failed(&"a gradient is no number"))
+    }
 }
 
 fn encoder(gpu: &Gpu) -> wgpu::CommandEncoder {
@@ -299,28 +333,18 @@ fn encoder(gpu: &Gpu) -> wgpu::CommandEncoder {
 }
 
 impl LearnKernels {
-    fn new(gpu: &Gpu, hidden: usize) -> Result<Self, GpuError> {
-        let limits = gpu.device.limits();
-        let hidden = hidden as u32;
-        let invocations = limits
-            .max_compute_invocations_per_workgroup
-            .min(limits.max_compute_workgroup_size_x);
-        let allowed_bytes = limits.max_compute_workgroup_storage_size;
-        let needed = |tile| workgroup_bytes(tile, hidden);
-        for (what, needed, allowed) in [
-            ("invocations in a workgroup", hidden.max(64), invocations),
-            (
-                "bytes of a workgroup's own memory",
-                needed(Tile::Of8),
-                allowed_bytes,
-            ),
-        ] {
-            at_most(gpu, what, u64::from(needed), u64::from(allowed))?;
-        }
-        let tile = Tile::that_takes(needed, allowed_bytes).unwrap_or(Tile::Of8);
+    pub(super) fn new(gpu: &Gpu, hidden: usize) -> Result<Self, GpuError> {
+        let width = hidden as u32;
+        let needed = |tile| workgroup_bytes(tile, width);
+        let invocations = width.max(SIDE * SIDE);
+        let tile = kernels::fitting_tile(gpu, (invocations, STORAGE_BUFFERS), needed)?;
+        Self::with_tile(gpu, hidden, tile)
+    }
+
+    pub(super) fn with_tile(gpu: &Gpu, hidden: usize, tile: Tile) -> Result<Self, GpuError> {
         let layout = bind_group_layout(&gpu.device, "learn", &[false, true, true]);
         let head = format!(
-            "const HIDDEN = {hidden}u;\n{TAPE}{SINE}{}{LAYER}",
+            "const HIDDEN = {hidden}u;\nconst BLOCK = {BLOCK}u;\nconst SIDE = {SIDE}u;\nconst FACTORS = {FACTORS}u;\n{}{TAPE}{SINE}{LAYER}",
             tile.source()
         );
         let made = |name, of| pipeline(&gpu.device, &layout, (name, &format!("{head}{of}")));

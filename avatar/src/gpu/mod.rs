@@ -1,8 +1,9 @@
-//! The drive on a graphics card: an avatar's full field at every vertex, skinning and normals as compute shaders.
+//! An avatar's field on a graphics card, as compute shaders: driven ([`GpuDriver`]) and learned ([`GpuGradients`]).
 //!
-//! In: a [`wgpu::Adapter`] and a [`Driver`](crate::Driver), whose twin it is. Out: the same
-//! [`AvatarMesh`](crate::AvatarMesh) within a hundredth of a millimetre, or an error: then the caller goes on with the
-//! processor, as [`LiveDriver`](crate::LiveDriver) does.
+//! In: a [`wgpu::Adapter`], and a [`Driver`](crate::Driver) or the fields of a step of fine-tuning. Out: what the twin on
+//! the processor gives, meshes within a hundredth of a millimetre and gradients within a hundred-thousandth, or an error:
+//! then the caller goes on with the processor, as [`LiveDriver`](crate::LiveDriver) and
+//! [`FineTuner`](crate::fine_tune::FineTuner) do.
 
 mod buffers;
 mod device;

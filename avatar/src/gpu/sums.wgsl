@@ -1,51 +1,60 @@
 // What a frame's points say about its parameters: twins of the products and sums of `backward` in `sdf/kernel.rs`. Points
-// are summed in their order, so that the sum is always the same.
+// are summed in their order, so that the sum is always the same. `learner.rs` says how large BLOCK, SIDE and FACTORS are.
 
-// Rows and columns of a weight that a workgroup takes, four by four an invocation.
-const BLOCK = 32u;
+// p and z of BLOCK rows, T and h of BLOCK columns: four points of each, then the next four.
+var<workgroup> factors: array<vec4f, FACTORS * TILE / 4u>;
 
-// p and z of the rows, T and h of the columns.
-var<workgroup> factors: array<Tile, 128>;
-
-@compute @workgroup_size(64)
+// An invocation takes four rows, and every SIDE-th column of a block.
+@compute @workgroup_size(SIDE * SIDE)
 fn hidden_weights(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) local: u32) {
     let blocks = (HIDDEN + BLOCK - 1u) / BLOCK;
     let rows_at = group.x / blocks * BLOCK;
     let columns_at = group.x % blocks * BLOCK;
     let layer = group.y + 1u;
     let frame = group.z;
-    let row = local / 8u * 4u;
-    let column = local % 8u * 4u;
+    let row = local / SIDE * 4u;
+    let column = local % SIDE;
     // Each column's four rows.
     var sums = mat4x4f();
     for (var tile = 0u; tile < batch.tiles; tile++) {
         let slot = frame * batch.tiles + tile;
         workgroupBarrier();
-        load_factor(slot, layer, rows_at, columns_at, local);
-        load_factor(slot, layer, rows_at, columns_at, local + 64u);
+        for (var number = local; number < FACTORS; number += SIDE * SIDE) {
+            load_factor(slot, layer, rows_at, columns_at, number);
+        }
         workgroupBarrier();
         for (var four = 0u; four < TILE / 4u; four++) {
-            let p = mat4x4f(factors[row][four], factors[row + 1u][four], factors[row + 2u][four], factors[row + 3u][four]);
-            let at = BLOCK + row;
-            let z = mat4x4f(factors[at][four], factors[at + 1u][four], factors[at + 2u][four], factors[at + 3u][four]);
-            for (var k = 0u; k < 4u; k++) {
-                let tangent = factors[2u * BLOCK + column + k][four];
-                let h = factors[3u * BLOCK + column + k][four];
-                // A row vector times a matrix: a product with each of its columns.
-                sums[k] += tangent * p + h * z;
-            }
+            let at = four * FACTORS;
+            let p = four_from(at + row);
+            let z = four_from(at + BLOCK + row);
+            let column_at = at + 2u * BLOCK + column;
+            sums += mat4x4f(
+                products(p, z, column_at),
+                products(p, z, column_at + SIDE),
+                products(p, z, column_at + 2u * SIDE),
+                products(p, z, column_at + 3u * SIDE),
+            );
         }
     }
     let weight_at = batch.gradients_at + frame * batch.parameters + 4u * HIDDEN + group.y * (HIDDEN + 1u) * HIDDEN;
     for (var k = 0u; k < 4u; k++) {
         for (var i = 0u; i < 4u; i++) {
             let unit = rows_at + row + i;
-            let input = columns_at + column + k;
+            let input = columns_at + column + k * SIDE;
             if unit < HIDDEN && input < HIDDEN {
                 found[weight_at + unit * HIDDEN + input] = sums[k][i];
             }
         }
     }
+}
+
+fn four_from(at: u32) -> mat4x4f {
+    return mat4x4f(factors[at], factors[at + 1u], factors[at + 2u], factors[at + 3u]);
+}
+
+// A column's with four rows. A vector times a matrix is its product with each of the matrix' columns.
+fn products(p: mat4x4f, z: mat4x4f, column_at: u32) -> vec4f {
+    return factors[column_at] * p + factors[column_at + BLOCK] * z;
 }
 
 // Beyond the last unit there is the last unit: nobody asks for its sums.
@@ -60,7 +69,10 @@ fn load_factor(slot: u32, layer: u32, rows_at: u32, columns_at: u32, number: u32
         case 2u: { at = place(slot, layer - 1u, T, column); }
         default: { at = place(slot, layer - 1u, H, column); }
     }
-    factors[number] = tape[at];
+    let of_points = tape[at];
+    for (var four = 0u; four < TILE / 4u; four++) {
+        factors[four * FACTORS + number] = of_points[four];
+    }
 }
 
 // Biases; of the first layer and of the last one weights, too. The last bias is the processor's.

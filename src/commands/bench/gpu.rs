@@ -34,21 +34,18 @@ pub(super) fn step_rows(
     let (mut cpu, mut card) = (made()?, made()?);
     card.lend(&gpu);
     let rounds = if gpu.is_software() { 1 } else { rounds };
-    let mut failed = [Ok(()), Ok(())];
+    let mut failed = [None, None];
     let [of_cpu, of_card] = &mut failed;
     let [by_cpu, by_card] = in_turn(
         rounds,
         [
-            &mut || {
-                *of_cpu = cpu.step().map(drop);
-            },
-            &mut || {
-                *of_card = card.step().map(drop);
-            },
+            &mut || *of_cpu = of_cpu.take().or(cpu.step().err()),
+            &mut || *of_card = of_card.take().or(card.step().err()),
         ],
     );
-    // What ends in an error once does so each time.
-    failed.into_iter().collect::<Result<(), _>>()?;
+    if let Some(error) = failed.into_iter().flatten().next() {
+        return Err(error.into());
+    }
     if let Some(reason) = card.gave_up() {
         eprintln!("effigy: no rows about fine-tuning on a graphics card: {reason}");
         return Ok(Vec::new());

@@ -61,8 +61,12 @@ fn evaluate_tracking(args: &EvaluateTrackingArgs) -> anyhow::Result<()> {
         .collect();
     let count: usize = suites.iter().map(|(_, cases)| cases.len()).sum();
     let progress = Progress::new("tracking", Some(count as u64));
-    let options =
-        tracking::Options { clean: settings.clean, track: settings.track, true_surface: false };
+    let options = tracking::Options {
+        clean: settings.clean,
+        track: settings.track,
+        smooth: settings.smooth.unwrap_or_default(),
+        true_surface: false,
+    };
     let mut table = tracking::Table::default();
     let mut before = 0;
     for (variant, cases) in &suites {

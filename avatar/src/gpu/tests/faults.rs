@@ -102,9 +102,10 @@ fn what_the_kernels_do_not_do_is_refused_with_its_reason() {
 #[test]
 fn wide_fields_take_smaller_tiles_and_too_wide_ones_none() {
     const BYTES: u32 = 16_384;
-    assert_eq!(Tile::for_width(128, BYTES), Some(Tile::Of16));
-    assert_eq!(Tile::for_width(256, BYTES), Some(Tile::Of8));
-    assert_eq!(Tile::for_width(512, BYTES), None);
+    let for_width = |hidden| Tile::that_takes(|tile| tile.workgroup_bytes(hidden), BYTES);
+    assert_eq!(for_width(128), Some(Tile::Of16));
+    assert_eq!(for_width(256), Some(Tile::Of8));
+    assert_eq!(for_width(512), None);
 }
 
 /// The prior's field in the pose of its topology, one with broken parameters in all others.

@@ -5,9 +5,7 @@ use std::sync::Arc;
 use effigy_avatar::skinning::star_body;
 use effigy_capture::{Frame, FrameId, Intrinsics, Timestamp};
 use effigy_fusion::clean::Cleaner;
-use effigy_registration::{
-    BodyModel, BodyParams, RegisteredFrame, SmoothConfig, Smoother, Tracker,
-};
+use effigy_registration::{BodyModel, BodyParams, RegisteredFrame, Smoother, Tracker};
 use effigy_sim_sensor::{SimulatedSensor, StrangerTruth, Truth};
 
 use super::{
@@ -39,7 +37,7 @@ pub(super) fn follow(
             None,
         ),
     };
-    let mut smoother = Smoother::new(SmoothConfig::default());
+    let mut smoother = Smoother::new(options.smooth);
     let moments = moments(case);
     let mut scores = CaseScores::default();
     for (number, moment) in moments.iter().enumerate() {

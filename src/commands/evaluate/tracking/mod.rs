@@ -25,7 +25,7 @@ use std::{
 
 use anyhow::Context as _;
 use effigy_fusion::clean::CleanConfig;
-use effigy_registration::{BodyModel, TrackConfig};
+use effigy_registration::{BodyModel, SmoothConfig, TrackConfig};
 
 use score::CaseScores;
 
@@ -34,6 +34,8 @@ use score::CaseScores;
 pub(crate) struct Options {
     pub(crate) clean: CleanConfig,
     pub(crate) track: TrackConfig,
+    /// How poses are calmed that are judged smoothed.
+    pub(crate) smooth: SmoothConfig,
     /// Whether the tracker is told the surface that the last frame truly had.
     pub(crate) true_surface: bool,
 }
