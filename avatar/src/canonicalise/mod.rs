@@ -49,7 +49,7 @@ pub struct CanonicaliseConfig {
     pub points: usize,
     /// Empty points a frame gives at most, half in front of the surface and half beside it.
     pub free_points: usize,
-    /// Points farther from the posed minimal body belong to something else: loose clothes stay within.
+    /// Points farther from the posed minimal body belong to something else: skirts stay within.
     pub max_distance_to_body_m: f32,
     /// Points that inverse and forward skinning do not bring back to within this are dropped.
     pub max_return_m: f32,
@@ -83,7 +83,7 @@ impl Default for CanonicaliseConfig {
         Self {
             points: 5000,
             free_points: 2500,
-            max_distance_to_body_m: 0.10,
+            max_distance_to_body_m: 0.15,
             max_return_m: 0.02,
             contact_reach_m: 0.10,
             contact_margin_m: 0.04,
