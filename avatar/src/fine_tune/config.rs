@@ -53,7 +53,7 @@ impl Default for FineTuneConfig {
             held_out_every: 50,
             sampling: SamplingConfig::default(),
             rates: RateConfig::default(),
-            loss: LossConfig::default(),
+            loss: LossConfig::without_normals(),
             threads: ThreadsConfig { count: 0 },
         }
     }

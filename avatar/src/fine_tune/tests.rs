@@ -11,7 +11,7 @@ use crate::{
     AvatarError, CanonicalSamples, PoseInput, SignedDistanceField as _,
     hyper::{HeadKind, HyperConfig, HyperNetwork, RateConfig},
     nn::{Threads, ThreadsConfig},
-    sdf::{SirenConfig, SirenField},
+    sdf::{SirenConfig, SirenField, loss::LossConfig},
 };
 
 const SMALL: HyperConfig = HyperConfig {
@@ -61,6 +61,8 @@ pub(crate) fn config() -> FineTuneConfig {
             ..Default::default()
         },
         rates: RateConfig { field: 2e-3, ..RateConfig::everything() },
+        // Nobody told this network what is inside.
+        loss: LossConfig::default(),
         ..FineTuneConfig::default().without_code()
     }
 }

@@ -9,6 +9,7 @@ use crate::{
     error::AvatarError,
     fine_tune::{FineTuneConfig, fine_tune},
     hyper::HyperNetwork,
+    sdf::loss::LossConfig,
 };
 
 /// Somebody whom training never sees.
@@ -38,13 +39,14 @@ pub struct Validated {
 }
 
 impl Validation {
-    /// Few steps, since what is asked for is a good start; all at one pace, so that the first stage, which knows nobody
-    /// apart, is judged alike.
+    /// Few steps, since what is asked for is a good start; all at one pace and with normals, so that the first stage, which
+    /// knows nobody apart, is judged alike.
     pub fn new(people: Vec<HeldOut>) -> Self {
         let fine_tune = FineTuneConfig {
             steps: 100,
             held_out_share: 0.0,
             held_out_every: u32::MAX,
+            loss: LossConfig::default(),
             ..FineTuneConfig::default().without_code()
         };
         Self { people, fine_tune }

@@ -11,6 +11,7 @@ use effigy_avatar::{
     fine_tune::{FineTuneConfig, fine_tune},
     hyper::{HyperNetwork, PRIOR_CONFIG, RateConfig},
     mesher,
+    sdf::loss::LossConfig,
 };
 use effigy_capture::CameraModel;
 use effigy_fusion::{TriangleMesh, mesh::sample::sample_surface};
@@ -328,7 +329,9 @@ fn tuning(job: &Job, frames: usize, live: &FineTuneConfig) -> FineTuneConfig {
     let live = match job.method {
         Method::BareBody | Method::Effigy => *live,
         // One surface for all poses is nearer without, too: who it is tells what poses do.
-        _ => live.without_code(),
+        Method::Static => live.without_code(),
+        // Who does not know people has to be told which side is inside, and true surfaces have true normals.
+        _ => FineTuneConfig { loss: LossConfig::default(), ..live.without_code() },
     };
     let mut tuning = FineTuneConfig { seed: job.seed, ..live };
     match (job.method, job.data) {

@@ -9,6 +9,7 @@ use effigy_avatar::{
     canonicalise::CanonicaliseConfig,
     fine_tune::{FineTuneConfig, fine_tune},
     hyper::{HyperNetwork, RateConfig},
+    sdf::loss::LossConfig,
 };
 use effigy_fusion::mesh::sample::sample_surface;
 use effigy_registration::BodyModel;
@@ -78,6 +79,7 @@ fn teach(
         frames_per_step: FRAMES_PER_STEP,
         held_out_share: 0.0,
         rates: RateConfig::everything(),
+        loss: LossConfig::default(),
         ..live.without_code()
     };
     if let Some(architecture) = architecture(method) {
