@@ -37,6 +37,7 @@ pub fn fit(
     let keyframes = sampling::keyframes(samples, 0.0, &mut rng);
     let mut moments = Moments::zeros(field.mlp.parameters.len());
     let mut gradients = MlpGradients::default();
+    let loss = config.loss_of_step();
     for step in 0..config.steps {
         let drawn = draw(&keyframes, labels, config, &mut rng);
         let codes: Vec<_> = drawn
@@ -57,7 +58,7 @@ pub fn fit(
             if is_occupancy {
                 occupancy_loss(scale, point, value)
             } else {
-                point_loss(&config.loss, scale, point, value, gradient)
+                point_loss(&loss, scale, point, value, gradient)
             }
         });
         if !terms.total().is_finite() {
@@ -143,6 +144,7 @@ mod tests {
             steps: 800,
             sampling,
             rates: RateConfig { field: 2e-4, ..RateConfig::default() },
+            learns_normals: true,
             ..FineTuneConfig::default()
         };
         let mut field = ConditionedField::new(Architecture::Siren, 1);

@@ -35,6 +35,9 @@ pub struct FineTuneConfig {
     pub sampling: SamplingConfig,
     pub rates: RateConfig,
     pub loss: LossConfig,
+    /// Whether the loss has its term of normals. Those of a depth map err where the surface bends, and eight frames of points
+    /// say more without them (docs/evaluation.md); but a network that knows nobody is told by them alone what is inside.
+    pub learns_normals: bool,
     pub threads: ThreadsConfig,
 }
 
@@ -53,7 +56,8 @@ impl Default for FineTuneConfig {
             held_out_every: 50,
             sampling: SamplingConfig::default(),
             rates: RateConfig::default(),
-            loss: LossConfig::without_normals(),
+            loss: LossConfig::default(),
+            learns_normals: false,
             threads: ThreadsConfig { count: 0 },
         }
     }
@@ -69,6 +73,15 @@ impl FineTuneConfig {
             ..self.rates
         };
         Self { code_steps: 0, rates, ..self }
+    }
+
+    /// What a step minimises.
+    pub(crate) fn loss_of_step(&self) -> LossConfig {
+        if self.learns_normals {
+            self.loss
+        } else {
+            LossConfig { normal: 0.0, ..self.loss }
+        }
     }
 
     /// The share of the rates at a step, counted from zero.

@@ -120,7 +120,8 @@ impl FineTuner {
         self.rng = of_steps;
         let (_, parameters) = self.network.forward(&poses);
         let frames = frames(&parameters, &self.points, &self.known);
-        self.gradients.try_out(&frames, &self.config.loss, clock);
+        self.gradients
+            .try_out(&frames, &self.config.loss_of_step(), clock);
     }
 
     /// What computes steps: "CPU", "AMD Radeon RX 7600".
@@ -179,7 +180,7 @@ impl FineTuner {
         let poses = self.draw();
         let (cache, parameters) = self.network.forward(&poses);
         let frames = frames(&parameters, &self.points, &self.known);
-        let terms = self.gradients.compute(&frames, &self.config.loss);
+        let terms = self.gradients.compute(&frames, &self.config.loss_of_step());
         if !terms.total().is_finite() {
             return Err(AvatarError::LossNotFinite { step: self.step, terms });
         }

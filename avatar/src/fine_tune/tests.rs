@@ -11,7 +11,7 @@ use crate::{
     AvatarError, CanonicalSamples, PoseInput, SignedDistanceField as _,
     hyper::{HeadKind, HyperConfig, HyperNetwork, RateConfig},
     nn::{Threads, ThreadsConfig},
-    sdf::{SirenConfig, SirenField, loss::LossConfig},
+    sdf::{SirenConfig, SirenField},
 };
 
 const SMALL: HyperConfig = HyperConfig {
@@ -62,7 +62,7 @@ pub(crate) fn config() -> FineTuneConfig {
         },
         rates: RateConfig { field: 2e-3, ..RateConfig::everything() },
         // Nobody told this network what is inside.
-        loss: LossConfig::default(),
+        learns_normals: true,
         ..FineTuneConfig::default().without_code()
     }
 }
@@ -212,6 +212,31 @@ fn points_far_from_whoever_was_found_count_less() {
     let (doubted, believed) = (off(0.02), off(0.0));
     println!("{doubted} with doubts, {believed} without");
     assert!(doubted < 0.8 * believed, "{doubted} {believed}");
+}
+
+#[test]
+fn normals_say_nothing_unless_they_are_learned() {
+    let mut lying = keyframes();
+    for samples in &mut lying {
+        samples.normals.fill(Vec3::X);
+    }
+    let learned_from = |samples: &[CanonicalSamples], learns_normals| {
+        // Points beside the surface lie along normals.
+        let sampling = SamplingConfig { near: 0, ..config().sampling };
+        let config = FineTuneConfig { steps: 3, sampling, learns_normals, ..config() };
+        let mut ignore = |_: &_, _: &_| ControlFlow::Continue(());
+        fine_tune(network(), samples, 1.0, &config, &|| 0.0, &mut ignore).unwrap()
+    };
+    let both = |learns| {
+        (
+            learned_from(&keyframes(), learns),
+            learned_from(&lying, learns),
+        )
+    };
+    let (honest, misled) = both(false);
+    assert_eq!(honest, misled);
+    let (honest, misled) = both(true);
+    assert_ne!(honest, misled);
 }
 
 #[test]

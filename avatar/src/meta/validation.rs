@@ -9,7 +9,6 @@ use crate::{
     error::AvatarError,
     fine_tune::{FineTuneConfig, fine_tune},
     hyper::HyperNetwork,
-    sdf::loss::LossConfig,
 };
 
 /// Somebody whom training never sees.
@@ -46,7 +45,7 @@ impl Validation {
             steps: 100,
             held_out_share: 0.0,
             held_out_every: u32::MAX,
-            loss: LossConfig::default(),
+            learns_normals: true,
             ..FineTuneConfig::default().without_code()
         };
         Self { people, fine_tune }

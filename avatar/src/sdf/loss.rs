@@ -60,12 +60,6 @@ pub struct LossConfig {
 }
 
 impl LossConfig {
-    /// For a network that knows people, and inside from outside: normals of a depth map err where the surface bends, and
-    /// eight frames of points say more without them (docs/evaluation.md).
-    pub fn without_normals() -> Self {
-        Self { normal: 0.0, ..Self::default() }
-    }
-
     /// MetaAvatar's weights (seed-systems 1.7).
     pub fn paper() -> Self {
         Self { distance: 0.0, free: 0.0, ..Self::default() }

@@ -11,7 +11,6 @@ use effigy_avatar::{
     fine_tune::{FineTuneConfig, fine_tune},
     hyper::{HyperNetwork, PRIOR_CONFIG, RateConfig},
     mesher,
-    sdf::loss::LossConfig,
 };
 use effigy_capture::CameraModel;
 use effigy_fusion::{TriangleMesh, mesh::sample::sample_surface};
@@ -331,7 +330,7 @@ fn tuning(job: &Job, frames: usize, live: &FineTuneConfig) -> FineTuneConfig {
         // One surface for all poses is nearer without, too: who it is tells what poses do.
         Method::Static => live.without_code(),
         // Who does not know people has to be told which side is inside, and true surfaces have true normals.
-        _ => FineTuneConfig { loss: LossConfig::default(), ..live.without_code() },
+        _ => FineTuneConfig { learns_normals: true, ..live.without_code() },
     };
     let mut tuning = FineTuneConfig { seed: job.seed, ..live };
     match (job.method, job.data) {

@@ -9,7 +9,6 @@ use effigy_avatar::{
     canonicalise::CanonicaliseConfig,
     fine_tune::{FineTuneConfig, fine_tune},
     hyper::{HyperNetwork, RateConfig},
-    sdf::loss::LossConfig,
 };
 use effigy_fusion::mesh::sample::sample_surface;
 use effigy_registration::BodyModel;
@@ -79,7 +78,7 @@ fn teach(
         frames_per_step: FRAMES_PER_STEP,
         held_out_share: 0.0,
         rates: RateConfig::everything(),
-        loss: LossConfig::default(),
+        learns_normals: true,
         ..live.without_code()
     };
     if let Some(architecture) = architecture(method) {
