@@ -31,7 +31,8 @@ pub struct MapConfig {
     pub most_p95_mm: f32,
     /// Poses so many times farther out than the farthest that was learned from are evaluated in full. Tracking that errs by
     /// 0.05 rad a joint is 6 times as far out, where a map of the untuned prior was 0.6 mm (p95) off, one that errs by 0.1
-    /// rad 20 times, and 1.2 mm; the tracked poses of a demo are 3 to 8 times, and 0.1 to 0.2 mm.
+    /// rad 20 times, and 1.2 mm; the tracked poses of a demo are 3 to 8 times, and 0.1 to 0.2 mm (a
+    /// diagnosis that is not committed).
     pub farthest: f32,
 }
 

@@ -19,14 +19,19 @@ fn of_unit(at: u32, unit: u32) -> f32 {
     return field[at + unit / 4u][unit % 4u];
 }
 
+// What is given of a tile's points, whose list begins at `at`; all must come here together.
+fn take_points(at: u32, slot: u32, unit: u32) {
+    if unit < TILE {
+        points[unit] = field[at + slot * TILE + unit];
+    }
+    workgroupBarrier();
+}
+
 @compute @workgroup_size(HIDDEN)
 fn forward(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) unit: u32) {
     let frame = group.y;
     let slot = frame * batch.tiles + group.x;
-    if unit < TILE {
-        points[unit] = field[batch.points_at + slot * TILE + unit];
-    }
-    workgroupBarrier();
+    take_points(batch.points_at, slot, unit);
     let first = field[frame * batch.field_len + unit];
     var c = pass_sine(slot, 0u, unit, products_with_points(first));
     for (var layer = 1u; layer < batch.sines; layer++) {
@@ -97,10 +102,7 @@ fn pass_sine(slot: u32, layer: u32, unit: u32, z: Tile) -> Tile {
 fn backward(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) unit: u32) {
     let frame = group.y;
     let slot = frame * batch.tiles + group.x;
-    if unit < TILE {
-        points[unit] = field[batch.bars_at + slot * TILE + unit];
-    }
-    workgroupBarrier();
+    take_points(batch.bars_at, slot, unit);
     let first = field[frame * batch.field_len + unit].xyz;
     var t = products_with_points(vec4f(first, 0.0));
     for (var layer = 0u; ; layer++) {

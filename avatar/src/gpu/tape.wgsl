@@ -1,4 +1,4 @@
-// What the learner's kernels see; `learner.rs` has the same structure. Frames have a field each, and as many tiles of points
+// What the learner's kernels see; `layout.rs` has the same structure. Frames have a field each, and as many tiles of points
 // each; what is missing in the last of them weighs nothing.
 
 struct Batch {
