@@ -89,13 +89,13 @@ pub(crate) struct SceneArgs {
     #[arg(long, default_value = "azure", value_parser = named::<SensorPreset>)]
     pub(crate) sensor: SensorPreset,
     /// What the person does: mixture, turn-around, walk-in-place, raise-arms, squat, wave, stand, twist, punch, shoulder-mill, hips,
-    /// soccer-kick, ballerina-spin, walk, reach, sit-down, bend, chicken-wings, flying-eagle, or a file: .bvh, .amc,
+    /// soccer-kick, ballerina-spin, walk, reach, sit-down, bend, chicken-wings, flying-eagle, freestyle, or a file: .bvh, .amc,
     /// SMPL's .npz or .csv
     #[arg(long, default_value = "mixture", value_parser = motion)]
     pub(crate) motion: MotionChoice,
     /// What the person wears: demo, close-fitting, loose, sport, random, bare; or simulated cloth: tshirt-trousers,
-    /// tshirt-shorts, longsleeve-trousers, longsleeve-wide-trousers, polo-trousers, hoodie-trousers, blazer-trousers,
-    /// skirt, dress
+    /// tshirt-shorts, longsleeve-trousers, longsleeve-wide-trousers, polo-trousers, hoodie-trousers, cardigan-trousers,
+    /// blazer-trousers, skirt, dress
     #[arg(long, default_value = "demo", value_parser = named::<OutfitKind>)]
     pub(crate) outfit: OutfitKind,
     /// A skinned glTF character (.glb, .gltf) instead of our own people, in its own clothes

@@ -88,19 +88,21 @@ pub enum ClothKind {
     LongsleeveWideTrousers,
     PoloTrousers,
     HoodieTrousers,
+    CardiganTrousers,
     BlazerTrousers,
     Skirt,
     Dress,
 }
 
 impl ClothKind {
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 10] = [
         Self::TshirtTrousers,
         Self::TshirtShorts,
         Self::LongsleeveTrousers,
         Self::LongsleeveWideTrousers,
         Self::PoloTrousers,
         Self::HoodieTrousers,
+        Self::CardiganTrousers,
         Self::BlazerTrousers,
         Self::Skirt,
         Self::Dress,
@@ -114,6 +116,7 @@ impl ClothKind {
             Self::LongsleeveWideTrousers => "longsleeve-wide-trousers",
             Self::PoloTrousers => "polo-trousers",
             Self::HoodieTrousers => "hoodie-trousers",
+            Self::CardiganTrousers => "cardigan-trousers",
             Self::BlazerTrousers => "blazer-trousers",
             Self::Skirt => "skirt",
             Self::Dress => "dress",
@@ -139,6 +142,14 @@ impl ClothKind {
             Self::LongsleeveWideTrousers => vec![tailor.wide_trousers(), tailor.longsleeve()],
             Self::PoloTrousers => vec![tailor.slim_trousers(), tailor.polo()],
             Self::HoodieTrousers => vec![tailor.slim_trousers(), tailor.hoodie()],
+            Self::CardiganTrousers => {
+                let close = Tailor { fit: 0.55, ..tailor };
+                vec![
+                    close.undershirt(),
+                    tailor.slim_trousers(),
+                    tailor.cardigan(),
+                ]
+            }
             Self::BlazerTrousers => {
                 let close = Tailor { fit: 0.55, ..tailor };
                 vec![close.undershirt(), tailor.suit_trousers(), tailor.blazer()]
@@ -211,7 +222,7 @@ impl Tailor {
     /// Held by the neck and the belt, it has to give where arms go up: wide, and cut off above the sleeve's bend.
     fn undershirt(&self) -> Pattern {
         let mut shirt = self.tucked_in();
-        shirt.name = "shirt under a blazer";
+        shirt.name = "shirt under a jacket";
         shirt.limbs = Limbs::Arms { end: 0.35 };
         shirt.material = WHITE;
         shirt
@@ -258,6 +269,27 @@ impl Tailor {
             },
             fabric: FLEECE,
             material: self.of(&HOODIES, 6),
+        }
+    }
+
+    /// Knitted, soft and open in front, from waist length to the middle of the thigh.
+    fn cardigan(&self) -> Pattern {
+        Pattern {
+            name: "cardigan",
+            top: Top::Collar { above_neck_m: 0.006, front_drop_m: 0.02 },
+            limbs: Limbs::Arms { end: self.random.between(16, 1.80, 1.94) },
+            hem: Some(self.random.between(17, 0.12, 0.55)),
+            front: Front::Open,
+            ease: Ease {
+                trunk_m: self.by_fit(0.026, 0.050),
+                limb_m: self.by_fit(0.016, 0.034),
+                end_m: self.by_fit(0.012, 0.028),
+                hem_m: self.by_fit(0.026, 0.060),
+                flare: self.random.between(18, 0.0, 0.20),
+                ribbed: false,
+            },
+            fabric: Fabric { friction: 0.15, ..FLEECE },
+            material: self.of(&HOODIES, 19),
         }
     }
 

@@ -49,6 +49,7 @@ fn share(values: impl IntoIterator<Item = bool>) -> f32 {
 fn garments_are_whole_surfaces_with_as_many_openings_as_they_should_have() {
     for (kind, fit, seed) in [
         (ClothKind::BlazerTrousers, 0.2, 1),
+        (ClothKind::CardiganTrousers, 0.5, 5),
         (ClothKind::PoloTrousers, 1.0, 3),
         (ClothKind::Skirt, 0.5, 4),
     ] {
@@ -104,6 +105,7 @@ fn every_outfit_stays_outside_and_as_long_as_it_was_cut() {
         ClothKind::LongsleeveTrousers,
         ClothKind::PoloTrousers,
         ClothKind::HoodieTrousers,
+        ClothKind::CardiganTrousers,
         ClothKind::Dress,
     ] {
         let mut wear = wear(kind, 0.5, 4);

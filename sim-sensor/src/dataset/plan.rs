@@ -20,7 +20,7 @@ pub enum DatasetPreset {
     PriorActions,
     /// In the manner of CAPE: ten people to learn from, four to fine-tune and test on, actions split as in MetaAvatar.
     CapeLike,
-    /// To choose settings by: three people whom neither training nor the tests ever meet.
+    /// To choose settings by: four people whom neither training nor the tests ever meet.
     Dev,
     /// A miniature for tests.
     Small,
@@ -140,9 +140,8 @@ const EXTRAPOLATED_ACTIONS: [Routine; 3] =
 impl DatasetPlan {
     pub fn new(preset: DatasetPreset, seed: u64) -> Self {
         let sequences = match preset {
-            DatasetPreset::Prior => learned_from(seed, (60, 40), &[0]),
-            // Any two of the twelve actions are done by somebody: all differences are among these.
-            DatasetPreset::PriorActions => learned_from(seed, (64, 32), &[0, 1, 4, 6]),
+            DatasetPreset::Prior => learned_from(seed, (60, 40), &[0], 0),
+            DatasetPreset::PriorActions => learned_from(seed, (81, 32), &[0, 1], 48),
             DatasetPreset::CapeLike => cape_like(seed),
             DatasetPreset::Dev => dev(seed),
             DatasetPreset::Small => small(seed),
@@ -167,9 +166,14 @@ impl DatasetPlan {
 }
 
 /// People of all shapes in every outfit of the training split, each of `people` doing the actions that come `apart` after
-/// their first, so many frames of each.
-fn learned_from(seed: u64, (people, frames): (u32, u32), apart: &[usize]) -> Vec<SequencePlan> {
-    let outfits = training_outfits();
+/// their first, so many frames of each, and then so many of whatever limbs can do.
+fn learned_from(
+    seed: u64,
+    (people, frames): (u32, u32),
+    apart: &[usize],
+    freestyle_frames: u32,
+) -> Vec<SequencePlan> {
+    let outfits = TRAINING_OUTFITS;
     let actions = LEARNED_ACTIONS.len();
     let random = Randomness::new(seed, 0, 0xda7a);
     let shift = (random.uniform(0) * actions as f32) as usize;
@@ -186,6 +190,16 @@ fn learned_from(seed: u64, (people, frames): (u32, u32), apart: &[usize]) -> Vec
             let action = LEARNED_ACTIONS[(first + apart) % actions];
             sequences.push(sequence(seed, wearer, action, Role::FineTune, frames));
         }
+        if freestyle_frames > 0 {
+            let action = Routine::Freestyle;
+            sequences.push(sequence(
+                seed,
+                wearer,
+                action,
+                Role::FineTune,
+                freestyle_frames,
+            ));
+        }
     }
     sequences
 }
@@ -195,7 +209,7 @@ fn cape_like(seed: u64) -> Vec<SequencePlan> {
     const TRAIN_PEOPLE: u32 = 10;
     const TRAIN_FRAMES: u32 = 40;
     const TEST_FRAMES: u32 = 40;
-    let outfits = training_outfits();
+    let [outfits @ .., _cardigan] = TRAINING_OUTFITS;
     let mut sequences = Vec::new();
     for subject in 0..TRAIN_PEOPLE {
         for k in 0..2 {
@@ -234,6 +248,7 @@ fn dev(seed: u64) -> Vec<SequencePlan> {
         OutfitKind::TshirtTrousers,
         OutfitKind::LongsleeveWideTrousers,
         OutfitKind::Dress,
+        OutfitKind::CardiganTrousers,
     ];
     let mut sequences = Vec::new();
     for (subject, outfit) in (FIRST_SUBJECT..).zip(outfits) {
@@ -258,19 +273,18 @@ fn small(seed: u64) -> Vec<SequencePlan> {
     ]
 }
 
-/// Every kind of garment but the blazer, which only test people wear.
-fn training_outfits() -> [OutfitKind; 8] {
-    [
-        OutfitKind::TshirtTrousers,
-        OutfitKind::TshirtShorts,
-        OutfitKind::LongsleeveTrousers,
-        OutfitKind::LongsleeveWideTrousers,
-        OutfitKind::PoloTrousers,
-        OutfitKind::HoodieTrousers,
-        OutfitKind::Skirt,
-        OutfitKind::Dress,
-    ]
-}
+/// Every kind of garment but the blazer, which only test people wear. The last one is not worn by [`cape_like`]'s people.
+const TRAINING_OUTFITS: [OutfitKind; 9] = [
+    OutfitKind::TshirtTrousers,
+    OutfitKind::TshirtShorts,
+    OutfitKind::LongsleeveTrousers,
+    OutfitKind::LongsleeveWideTrousers,
+    OutfitKind::PoloTrousers,
+    OutfitKind::HoodieTrousers,
+    OutfitKind::Skirt,
+    OutfitKind::Dress,
+    OutfitKind::CardiganTrousers,
+];
 
 /// Of each test person.
 fn test_outfits() -> [Vec<OutfitKind>; 4] {

@@ -34,6 +34,8 @@ pub enum OutfitKind {
     PoloTrousers,
     #[serde(rename = "hoodie-trousers")]
     HoodieTrousers,
+    #[serde(rename = "cardigan-trousers")]
+    CardiganTrousers,
     #[serde(rename = "blazer-trousers")]
     BlazerTrousers,
     Skirt,
@@ -103,6 +105,7 @@ impl OutfitKind {
             Self::LongsleeveWideTrousers => Some(ClothKind::LongsleeveWideTrousers),
             Self::PoloTrousers => Some(ClothKind::PoloTrousers),
             Self::HoodieTrousers => Some(ClothKind::HoodieTrousers),
+            Self::CardiganTrousers => Some(ClothKind::CardiganTrousers),
             Self::BlazerTrousers => Some(ClothKind::BlazerTrousers),
             Self::Skirt => Some(ClothKind::Skirt),
             Self::Dress => Some(ClothKind::Dress),
@@ -125,6 +128,7 @@ impl From<ClothKind> for OutfitKind {
             ClothKind::LongsleeveWideTrousers => Self::LongsleeveWideTrousers,
             ClothKind::PoloTrousers => Self::PoloTrousers,
             ClothKind::HoodieTrousers => Self::HoodieTrousers,
+            ClothKind::CardiganTrousers => Self::CardiganTrousers,
             ClothKind::BlazerTrousers => Self::BlazerTrousers,
             ClothKind::Skirt => Self::Skirt,
             ClothKind::Dress => Self::Dress,

@@ -11,6 +11,7 @@ use super::{
 
 mod arms;
 mod ease;
+mod freestyle;
 mod legs;
 mod seat;
 mod strikes;
@@ -55,6 +56,8 @@ pub enum Routine {
     Bend,
     ChickenWings,
     FlyingEagle,
+    /// Poses drawn at random, one after the other: wherever limbs can go.
+    Freestyle,
 }
 
 impl Routine {
@@ -106,6 +109,7 @@ impl Routine {
             Self::Bend => "bend",
             Self::ChickenWings => "chicken_wings",
             Self::FlyingEagle => "flying_eagle",
+            Self::Freestyle => "freestyle",
         }
     }
 
@@ -155,6 +159,7 @@ impl Routine {
             Self::Bend => vec![of(Movement::Bend, 6.4)],
             Self::ChickenWings => vec![of(Movement::ChickenWings, 5.0)],
             Self::FlyingEagle => vec![of(Movement::FlyingEagle, 6.0)],
+            Self::Freestyle => vec![of(Movement::Freestyle, 12.0)],
         }
     }
 }
@@ -180,6 +185,7 @@ enum Movement {
     Bend,
     ChickenWings,
     FlyingEagle,
+    Freestyle,
 }
 
 #[derive(Clone, Copy)]
@@ -240,6 +246,7 @@ fn apply(movement: Movement, at: Moment, style: &Style, rest: &RestBody, stance:
         Movement::Bend => trunk::bend(at, style, rest, stance),
         Movement::ChickenWings => arms::chicken_wings(at, style, stance),
         Movement::FlyingEagle => arms::flying_eagle(at, style, stance),
+        Movement::Freestyle => freestyle::freestyle(at, style, rest, stance),
     }
 }
 

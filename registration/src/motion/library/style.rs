@@ -20,6 +20,7 @@ pub(super) struct Style {
     elbow_rad: f32,
     lean_rad: f32,
     stance_width_m: f32,
+    seed: u64,
 }
 
 impl Style {
@@ -35,7 +36,14 @@ impl Style {
             elbow_rad: between(0.18, 0.42),
             lean_rad: between(-0.01, 0.05),
             stance_width_m: between(0.02, 0.05),
+            seed,
         }
+    }
+
+    /// A number of this performance's own from 0 to 1, by its number.
+    pub(super) fn uniform(&self, number: u64) -> f32 {
+        let mut state = self.seed ^ number.wrapping_mul(0xd1b5_4a32_d192_ed03);
+        next_uniform(&mut state)
     }
 
     /// A relaxed A-pose.

@@ -8,7 +8,10 @@ use crate::smpl::{BoneTransforms, builtin};
 const RATE_HZ: f32 = 30.0;
 
 fn every() -> impl Iterator<Item = Routine> {
-    Routine::ALL.into_iter().chain(Routine::ACTIONS)
+    Routine::ALL
+        .into_iter()
+        .chain(Routine::ACTIONS)
+        .chain([Routine::Freestyle])
 }
 
 fn rest() -> RestBody {
@@ -276,4 +279,33 @@ fn trunks_do_what_their_actions_names_say() {
         );
         assert!(most(routine, &|j| j[16].y - j[joint].y) > down, "and down");
     }
+}
+
+/// A data set shows the first seconds.
+#[test]
+fn within_seconds_freestyles_go_wherever_limbs_can_go() {
+    let rest = rest();
+    let mut reached = [f32::MIN; 5];
+    for seed in 0..12 {
+        let motion = Routine::Freestyle.motion(&rest, RATE_HZ, seed);
+        for pose in motion.poses.iter().take(4 * RATE_HZ as usize) {
+            let (_, j) = BoneTransforms::from_pose(&pose.theta, &rest.joints);
+            let now = [
+                j[20].y - j[15].y,
+                j[12].z - j[0].z,
+                (j[20] - j[1]).length() * -1.0,
+                j[11].y - j[10].y,
+                (j[10].x - j[11].x).abs(),
+            ];
+            for (most, now) in reached.iter_mut().zip(now) {
+                *most = most.max(now);
+            }
+        }
+    }
+    let [over_head, forwards, to_hip, foot_up, astride] = reached;
+    assert!(over_head > 0.2, "a hand over the head: {over_head}");
+    assert!(forwards > 0.25, "trunks bend: {forwards}");
+    assert!(to_hip > -0.25, "a hand at the hip: {to_hip}");
+    assert!(foot_up > 0.25, "a foot is lifted: {foot_up}");
+    assert!(astride > 0.35, "a foot goes aside: {astride}");
 }

@@ -176,23 +176,23 @@ fn no_test_person_and_no_blazer_is_ever_learned_from() {
 }
 
 #[test]
-fn a_prior_of_actions_sees_everybody_in_four_and_every_two_actions_in_somebody() {
+fn a_prior_of_actions_sees_everybody_in_two_and_free_and_most_actions_in_every_outfit() {
     let plan = DatasetPlan::new(DatasetPreset::PriorActions, 1);
-    let mut pairs = std::collections::BTreeSet::new();
+    let mut seen = std::collections::BTreeSet::new();
     let people = plan.sequences.chunk_by(|a, b| seed_of(a) == seed_of(b));
     let mut count = 0;
     for person in people {
         count += 1;
-        let actions: Vec<&str> = person.iter().map(|plan| plan.action.as_str()).collect();
-        assert_eq!(actions.len(), 4);
-        assert!(person.iter().all(|plan| plan.outfit == person[0].outfit));
-        for (k, &first) in actions.iter().enumerate() {
-            for &second in &actions[..k] {
-                pairs.insert((first.min(second), first.max(second)));
-            }
+        assert_eq!(person.len(), 3);
+        assert_eq!(person[2].action, "freestyle");
+        for sequence in person {
+            assert_eq!(sequence.outfit, person[0].outfit);
+            seen.insert((sequence.outfit.name(), sequence.action.as_str()));
         }
     }
-    assert_eq!((count, pairs.len()), (64, 12 * 11 / 2));
+    assert_eq!(count, 81);
+    let all = 9 * 13;
+    assert!(seen.len() > all * 9 / 10, "{} of {all}", seen.len());
 }
 
 #[test]
