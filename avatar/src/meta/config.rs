@@ -112,9 +112,9 @@ pub struct JointConfig {
 impl Default for JointConfig {
     fn default() -> Self {
         Self {
-            people: 150,
-            frames: 48,
-            steps: 8000,
+            people: 204,
+            frames: 56,
+            steps: 12_000,
             people_per_step: 4,
             frames_per_person: 2,
             code_rate: 5e-3,

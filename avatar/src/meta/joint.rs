@@ -17,6 +17,7 @@ use super::{
     train::{Learner, Stage},
 };
 use crate::{
+    SignedDistanceField as _,
     error::AvatarError,
     hyper::{HyperNetwork, Precision, optimizer::HyperOptimizer},
     nn::{AdamConfig, AdamStep, adam::Moments},
@@ -161,6 +162,38 @@ impl Learner for Joint {
         Ok(loss)
     }
 
+    fn taught(&self) -> Option<f64> {
+        const PEOPLE: usize = 16;
+        const FRAMES: usize = 3;
+        const POINTS: usize = 500;
+        let step = self.people.len().div_ceil(PEOPLE);
+        let people = self.people.iter().zip(&self.codes).step_by(step.max(1));
+        let (mut sum, mut count) = (0.0, 0);
+        for (person, code) in people {
+            let frames = person.poses.len().div_ceil(FRAMES).max(1);
+            let poses: Vec<_> = person.poses.iter().step_by(frames).copied().collect();
+            let codes = vec![code.as_slice(); poses.len()];
+            let (_, fields) = self.network.forward_with_codes(&poses, &codes);
+            for (frame, parameters) in person.points.iter().step_by(frames).zip(fields) {
+                let points: Vec<_> = frame
+                    .surface
+                    .iter()
+                    .take(POINTS)
+                    .map(|at| at.point)
+                    .collect();
+                let mut values = vec![0.0; points.len()];
+                SirenField::new(self.network.config().field, parameters)
+                    .values(&points, &mut values);
+                sum += values
+                    .iter()
+                    .map(|value| f64::from(value.abs()))
+                    .sum::<f64>();
+                count += values.len();
+            }
+        }
+        (count > 0).then(|| sum / count as f64)
+    }
+
     /// With the mean code in the coefficients' biases.
     fn network(&self, _config: &PriorConfig) -> HyperNetwork {
         let mut mean = vec![0.0; self.network.code_size()];
@@ -216,7 +249,7 @@ mod tests {
 
     use super::*;
     use crate::{
-        PoseInput, SignedDistanceField as _,
+        PoseInput,
         fine_tune::{SamplingConfig, sampling::random_in_box},
         hyper::{HeadKind, HyperConfig, RateConfig},
         meta::{JointConfig, Person, PersonFrame},

@@ -85,6 +85,11 @@ pub(super) trait Learner: Sized + Send {
         source: &dyn PersonSource,
     ) -> Result<f64, AvatarError>;
 
+    /// Mean distance of taught people's points to what was learned of them, unit lengths; `None` where nobody is known apart.
+    fn taught(&self) -> Option<f64> {
+        None
+    }
+
     /// What has been learned so far.
     fn network(&self, config: &PriorConfig) -> HyperNetwork;
 
@@ -212,7 +217,7 @@ impl Training<'_> {
             return Ok(false);
         };
         let network = learner.network(self.config);
-        let validated = validation.of(&network)?;
+        let validated = validation.of(&network, learner.taught())?;
         let is_better = |best: f64| validated.held_out_mm < best;
         if best.held_out_mm.is_none_or(is_better) {
             let held_out_mm = Some(validated.held_out_mm);

@@ -33,6 +33,9 @@ pub struct Validation {
 pub struct Validated {
     /// Mean distance of the judged surfaces' points to the fine-tuned surface, over all people, millimetres.
     pub held_out_mm: f64,
+    /// The same of some people that it learned from, each by the code found while learning, at the judges' mean size. Far below
+    /// the held-out error, more people are wanted; near it, a larger network.
+    pub taught_mm: Option<f64>,
     /// The fine-tuned networks, one a person.
     pub tuned: Vec<HyperNetwork>,
 }
@@ -51,7 +54,12 @@ impl Validation {
         Self { people, fine_tune }
     }
 
-    pub(super) fn of(&self, network: &HyperNetwork) -> Result<Validated, AvatarError> {
+    /// `taught`: of the people learned from, in unit lengths.
+    pub(super) fn of(
+        &self,
+        network: &HyperNetwork,
+        taught: Option<f64>,
+    ) -> Result<Validated, AvatarError> {
         let mut tuned = Vec::with_capacity(self.people.len());
         let mut sum_mm = 0.0;
         for person in &self.people {
@@ -66,7 +74,13 @@ impl Validation {
             sum_mm += person.error_mm(&own) / self.people.len() as f64;
             tuned.push(own);
         }
-        Ok(Validated { held_out_mm: sum_mm, tuned })
+        let sizes = self
+            .people
+            .iter()
+            .map(|person| f64::from(person.metres_per_unit));
+        let mean_size = sizes.sum::<f64>() / self.people.len().max(1) as f64;
+        let taught_mm = taught.map(|units| units * mean_size * 1e3);
+        Ok(Validated { held_out_mm: sum_mm, taught_mm, tuned })
     }
 }
 

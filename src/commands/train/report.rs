@@ -47,8 +47,11 @@ impl<'a> Reporter<'a> {
             TrainEvent::Validated(now, validated) => {
                 self.held_out_mm = Some(validated.held_out_mm);
                 self.curve.add_held_out(now, validated.held_out_mm);
+                let taught = validated
+                    .taught_mm
+                    .map_or_else(String::new, |mm| format!(", taught {mm:.3} mm"));
                 eprintln!(
-                    "{:?} {}/{}: held out {:.3} mm",
+                    "{:?} {}/{}: held out {:.3} mm{taught}",
                     now.stage, now.step, now.steps, validated.held_out_mm
                 );
                 let shown = self
