@@ -203,5 +203,5 @@ fn training_ends_early_with_its_best_network_when_nothing_gets_better() {
     let field = field.unwrap().unwrap();
     assert!(early, "{scores:?}");
     let best = scores.iter().copied().fold(f64::INFINITY, f64::min);
-    assert_eq!(validation.of(&field).unwrap().held_out_mm, best);
+    assert_eq!(validation.of(&field, None).unwrap().held_out_mm, best);
 }

@@ -293,7 +293,7 @@ fn within_seconds_freestyles_go_wherever_limbs_can_go() {
             let now = [
                 j[20].y - j[15].y,
                 j[12].z - j[0].z,
-                (j[20] - j[1]).length() * -1.0,
+                -(j[20] - j[1]).length(),
                 j[11].y - j[10].y,
                 (j[10].x - j[11].x).abs(),
             ];
