@@ -49,11 +49,12 @@ pub(crate) enum Beside {
 }
 
 /// What a map learns from beside the actions.
-const MORE_ROUTINES: [Routine; 4] = [
+const MORE_ROUTINES: [Routine; 5] = [
     Routine::Squat,
     Routine::RaiseArms,
     Routine::WalkInPlace,
     Routine::Wave,
+    Routine::Freestyle,
 ];
 
 /// What a map of somebody's avatar learns from.
