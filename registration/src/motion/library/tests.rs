@@ -97,8 +97,8 @@ fn assert_within_limits(name: &str, pose: &MotionPose) {
         (3, 0.6),
         (6, 0.6),
         (9, 0.6),
-        (7, 0.9),
-        (8, 0.9),
+        (7, 0.95),
+        (8, 0.95),
         (12, 0.6),
     ];
     for (joint, limit_rad) in limits {
