@@ -6,8 +6,11 @@ use rand_distr::{Distribution as _, StandardNormal};
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    CanonicalSamples,
-    sdf::loss::{Known, LossPoint},
+    CanonicalSamples, SignedDistanceField as _,
+    sdf::{
+        SirenField,
+        loss::{Known, LossPoint},
+    },
 };
 
 /// How many points of each kind a step takes from a keyframe.
@@ -179,6 +182,14 @@ impl KeyframePoints {
             push(random_in_box(rng), Known::Nothing, 1.0);
         }
     }
+}
+
+/// The field's values, unit lengths, at points that were measured.
+pub(crate) fn values_at(field: &SirenField, measured: &[SurfacePoint]) -> Vec<f32> {
+    let points: Vec<Vec3> = measured.iter().map(|at| at.point).collect();
+    let mut values = vec![0.0; points.len()];
+    field.values(&points, &mut values);
+    values
 }
 
 /// A uniform point of the unit box.

@@ -11,12 +11,12 @@ use serde::{Deserialize, Serialize};
 use super::{
     FineTuneConfig,
     live_gradients::LiveGradients,
-    sampling::{self, KeyframePoints, SurfacePoint},
+    sampling::{self, KeyframePoints, values_at},
 };
 #[cfg(feature = "gpu")]
 use crate::gpu::Gpu;
 use crate::{
-    CanonicalSamples, PoseInput, SignedDistanceField as _,
+    CanonicalSamples, PoseInput,
     error::AvatarError,
     hyper::{HyperNetwork, optimizer::HyperOptimizer},
     sdf::{
@@ -255,14 +255,6 @@ fn frames<'a>(
         .zip(points.iter().zip(known))
         .map(|(parameters, (points, known))| FieldFrame { parameters, points, known })
         .collect()
-}
-
-/// The field's values, unit lengths, at points that were measured.
-fn values_at(field: &SirenField, measured: &[SurfacePoint]) -> Vec<f32> {
-    let points: Vec<Vec3> = measured.iter().map(|at| at.point).collect();
-    let mut values = vec![0.0; points.len()];
-    field.values(&points, &mut values);
-    values
 }
 
 fn check(samples: &[CanonicalSamples]) -> Result<(), AvatarError> {

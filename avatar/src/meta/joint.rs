@@ -17,8 +17,8 @@ use super::{
     train::{Learner, Stage},
 };
 use crate::{
-    SignedDistanceField as _,
     error::AvatarError,
+    fine_tune::sampling::values_at,
     hyper::{HyperNetwork, Precision, optimizer::HyperOptimizer},
     nn::{AdamConfig, AdamStep, adam::Moments},
     sdf::SirenField,
@@ -175,15 +175,9 @@ impl Learner for Joint {
             let codes = vec![code.as_slice(); poses.len()];
             let (_, fields) = self.network.forward_with_codes(&poses, &codes);
             for (frame, parameters) in person.points.iter().step_by(frames).zip(fields) {
-                let points: Vec<_> = frame
-                    .surface
-                    .iter()
-                    .take(POINTS)
-                    .map(|at| at.point)
-                    .collect();
-                let mut values = vec![0.0; points.len()];
-                SirenField::new(self.network.config().field, parameters)
-                    .values(&points, &mut values);
+                let field = SirenField::new(self.network.config().field, parameters);
+                let points = &frame.surface[..frame.surface.len().min(POINTS)];
+                let values = values_at(&field, points);
                 sum += values
                     .iter()
                     .map(|value| f64::from(value.abs()))
@@ -320,9 +314,8 @@ mod tests {
             let codes = vec![code.as_slice(); person.poses.len()];
             let (_, fields) = joint.network.forward_with_codes(&person.poses, &codes);
             for (frame, parameters) in person.points.iter().zip(fields) {
-                let points: Vec<Vec3> = frame.surface.iter().map(|at| at.point).collect();
-                let mut values = vec![0.0; points.len()];
-                SirenField::new(config.network.field, parameters).values(&points, &mut values);
+                let field = SirenField::new(config.network.field, parameters);
+                let values = values_at(&field, &frame.surface);
                 sum += values.iter().map(|value| value.abs()).sum::<f32>();
                 count += values.len() as f32;
             }

@@ -186,19 +186,13 @@ fn learned_from(
         let wearer = Wearer { split: Split::Train, subject: person, outfit: outfits[number] };
         // Each outfit gets another action each time it is worn: 5 and 12 have no common divisor.
         let first = 5 * round + 3 * number + shift;
-        for apart in apart {
-            let action = LEARNED_ACTIONS[(first + apart) % actions];
+        let done = apart
+            .iter()
+            .map(|apart| (LEARNED_ACTIONS[(first + apart) % actions], frames))
+            .chain([(Routine::Freestyle, freestyle_frames)])
+            .filter(|(_, frames)| *frames > 0);
+        for (action, frames) in done {
             sequences.push(sequence(seed, wearer, action, Role::FineTune, frames));
-        }
-        if freestyle_frames > 0 {
-            let action = Routine::Freestyle;
-            sequences.push(sequence(
-                seed,
-                wearer,
-                action,
-                Role::FineTune,
-                freestyle_frames,
-            ));
         }
     }
     sequences

@@ -131,7 +131,7 @@ pub(super) fn flying_eagle(at: Moment, style: &Style, stance: &mut Stance) {
 }
 
 /// The hand at the hip bone, the elbow out.
-pub(super) fn hand_on_hip() -> Arm {
+pub(super) const fn hand_on_hip() -> Arm {
     Arm { abduction_rad: 0.74, flexion_rad: -0.22, twist_rad: 1.20, elbow_rad: 1.60 }
 }
 

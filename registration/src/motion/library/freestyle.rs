@@ -9,14 +9,13 @@ use super::{
     style::Style,
 };
 
-/// From one pose of an arm or of the trunk to the next, and from one stance of the legs to the next.
+/// From one pose of an arm, of the trunk or of the legs to the next.
 const POSE_SECS: f32 = 1.0;
-const STANCE_SECS: f32 = 1.0;
 /// At the start and the end, as a share of the whole.
 const FLANK: f32 = 0.06;
 
 /// Where arms can go; any two of these are mixed.
-const ARMS: [Arm; 9] = [
+const ARMS: [Arm; 10] = [
     arm(0.35, 0.10, 0.10, 0.30),
     arm(0.40, -0.55, 0.00, 0.25),
     arm(0.34, 0.80, -0.50, 1.70),
@@ -26,6 +25,7 @@ const ARMS: [Arm; 9] = [
     arm(2.60, 0.10, -0.80, 0.30),
     arm(1.45, 0.20, -1.30, 1.50),
     arm(1.05, 0.00, 0.80, 1.60),
+    hand_on_hip(),
 ];
 
 const fn arm(abduction_rad: f32, flexion_rad: f32, twist_rad: f32, elbow_rad: f32) -> Arm {
@@ -47,8 +47,8 @@ impl Draw<'_> {
     fn arm(self, side: usize) -> Arm {
         let first = 8 * side as u64;
         let kind = |part| {
-            let number = self.between(part, 0.0, (ARMS.len() + 1) as f32) as usize;
-            ARMS.get(number).copied().unwrap_or_else(hand_on_hip)
+            let number = self.between(part, 0.0, ARMS.len() as f32) as usize;
+            ARMS[number.min(ARMS.len() - 1)]
         };
         let mixed = self.between(first + 2, 0.0, 1.0);
         blend_arm(kind(first), kind(first + 1), mixed)
@@ -141,49 +141,44 @@ impl Legs {
     }
 }
 
-/// The poses before and after a time, and the share of the way between; pose 0 is the relaxed one.
-fn between(secs: f32, pose_secs: f32, late: f32) -> (u64, u64, f32) {
-    let at = (secs / pose_secs - late).max(0.0);
+/// What something does at a time: mixed from the pose drawn last and the next one; the first is the relaxed one.
+/// `late` is in poses.
+fn at_time<P>(
+    secs: f32,
+    late: f32,
+    relaxed: P,
+    drawn: impl Fn(u64) -> P,
+    mixed: impl Fn(P, P, f32) -> P,
+) -> P {
+    let at = (secs / POSE_SECS - late).max(0.0);
     let before = at.floor();
-    (before as u64, before as u64 + 1, smooth(at - before))
+    let number = before as u64;
+    let from = if number == 0 { relaxed } else { drawn(number) };
+    mixed(from, drawn(number + 1), smooth(at - before))
 }
 
 pub(super) fn freestyle(at: Moment, style: &Style, rest: &RestBody, stance: &mut Stance) {
     let going = window(at.share(), 0.0, 1.0, FLANK);
     let draw = |pose| Draw { style, pose };
-    for side in 0..2 {
-        let (from, to, share) = between(at.secs, POSE_SECS, 0.3 * side as f32);
-        let relaxed = stance.arms[side];
-        let of = |pose| {
-            if pose == 0 {
-                relaxed
-            } else {
-                draw(pose).arm(side)
-            }
-        };
-        stance.arms[side] = blend_arm(relaxed, blend_arm(of(from), of(to), share), going);
+    for (side, arm) in stance.arms.iter_mut().enumerate() {
+        let late = 0.3 * side as f32;
+        let now = at_time(at.secs, late, *arm, |pose| draw(pose).arm(side), blend_arm);
+        *arm = blend_arm(*arm, now, going);
     }
-    let (from, to, share) = between(at.secs, POSE_SECS, 0.15);
-    let of = |pose| {
-        if pose == 0 {
-            Trunk::default()
-        } else {
-            draw(pose).trunk()
-        }
-    };
-    let trunk = of(from).lerp(of(to), share);
+    let relaxed = Trunk::default();
+    let trunk = at_time(
+        at.secs,
+        0.15,
+        relaxed,
+        |pose| draw(pose).trunk(),
+        Trunk::lerp,
+    );
     stance.spine += trunk.spine * going;
     stance.pelvis_tilt += trunk.tilt * going;
     stance.head += trunk.head * going;
-    let (from, to, share) = between(at.secs, STANCE_SECS, 0.0);
-    let of = |pose| {
-        if pose == 0 {
-            Legs::default()
-        } else {
-            draw(pose).legs()
-        }
-    };
-    stand(of(from).lerp(of(to), share), trunk, going, rest, stance);
+    let relaxed = Legs::default();
+    let legs = at_time(at.secs, 0.0, relaxed, |pose| draw(pose).legs(), Legs::lerp);
+    stand(legs, trunk, going, rest, stance);
 }
 
 /// Puts the feet where they are to be, and the pelvis over them.

@@ -67,7 +67,7 @@ fn assert_speed(name: &str, before: &MotionPose, after: &MotionPose) {
     }
     let speed = (after.trans - before.trans).length() * RATE_HZ;
     assert!(
-        speed < 1.3,
+        speed < if name == "freestyle" { 1.3 } else { 1.2 },
         "{name}: pelvis at {speed} m/s; a squat has 0.7"
     );
 }
