@@ -1,5 +1,7 @@
 //! From what a mover thinks of (where the feet stand, how far the arms are raised) to SMPL's joint rotations.
 
+use std::f32::consts::PI;
+
 use glam::{Mat3, Quat, Vec2, Vec3, vec3};
 
 use super::{MotionPose, RestBody, short_axis_angle};
@@ -12,6 +14,10 @@ const COLLAR_SHARE: f32 = 0.22;
 /// Limits a healthy adult keeps while exercising, in radians.
 const ELBOW_LIMIT_RAD: f32 = 2.5;
 const ABDUCTION_LIMIT_RAD: f32 = 2.95;
+/// Of a foot that stands on nothing: it turns with the shin before its ankle bends further.
+const FREE_ANKLE_LIMIT_RAD: f32 = 0.88;
+/// So far off the floor a foot is free; on the way there the limit tightens.
+const FREE_LIFT_M: f32 = 0.04;
 
 /// One moment of a movement, in words a mover would use. Metres and radians.
 #[derive(Clone, Copy, Debug)]
@@ -71,14 +77,7 @@ impl Stance {
             std::array::from_fn(|side| self.feet[side].ankle(side, rest));
         let pelvis = self.reachable_pelvis(rest, heading, rotations[0], &ankles);
         for (side, ankle) in ankles.iter().enumerate() {
-            set_leg(
-                side,
-                pelvis,
-                ankle,
-                self.feet[side].pitch_rad,
-                rest,
-                &mut rotations,
-            );
+            self.feet[side].set_leg(side, pelvis, ankle, rest, &mut rotations);
         }
         let theta = rotations.map(short_axis_angle);
         let mut trans = pelvis - rest.joints[0];
@@ -130,11 +129,43 @@ impl Stance {
 impl Foot {
     /// Where the ankle has to be, and how the foot is turned, for the ball to be where it is.
     fn ankle(&self, side: usize, rest: &RestBody) -> AnkleTarget {
-        let (ankle, ball) = (rest.joints[7 + side], rest.joints[10 + side]);
         let rotation = Quat::from_rotation_y(self.yaw_rad) * Quat::from_rotation_x(self.pitch_rad);
+        self.ankle_turned(rotation, side, rest)
+    }
+
+    /// As [`Self::ankle`], for a foot that is turned otherwise than it wants to be.
+    fn ankle_turned(&self, rotation: Quat, side: usize, rest: &RestBody) -> AnkleTarget {
+        let (ankle, ball) = (rest.joints[7 + side], rest.joints[10 + side]);
         let ball_height_m = ball.y - rest.sole_height_m() + self.lift_m;
         let ball_in_world = vec3(self.ball_m.x, ball_height_m, self.ball_m.y);
         AnkleTarget { position: ball_in_world + rotation * (ankle - ball), rotation }
+    }
+
+    /// The leg that carries this foot. A free one gives way to the shin, its ball where it is as far as the leg reaches.
+    fn set_leg(
+        &self,
+        side: usize,
+        pelvis: Vec3,
+        ankle: &AnkleTarget,
+        rest: &RestBody,
+        rotations: &mut [Quat; JOINT_COUNT],
+    ) {
+        // Turning the foot moves the ankle, and with it the shin: less each time.
+        const ROUNDS: usize = 3;
+        let mut shin = bend_leg(side, pelvis, ankle, self.pitch_rad, rest, rotations);
+        let free = (self.lift_m / FREE_LIFT_M).clamp(0.0, 1.0);
+        let limit_rad = PI + (FREE_ANKLE_LIMIT_RAD - PI) * free;
+        for _ in 0..ROUNDS {
+            let bend = short_axis_angle(rotations[7 + side]);
+            if bend.length() <= limit_rad {
+                return;
+            }
+            let within = Quat::from_scaled_axis(bend.clamp_length_max(limit_rad));
+            let turned = self.ankle_turned(shin * within, side, rest);
+            shin = bend_leg(side, pelvis, &turned, self.pitch_rad, rest, rotations);
+        }
+        let bend = short_axis_angle(rotations[7 + side]);
+        rotations[7 + side] = Quat::from_scaled_axis(bend.clamp_length_max(limit_rad));
     }
 }
 
@@ -159,15 +190,15 @@ struct AnkleTarget {
     rotation: Quat,
 }
 
-/// Two-bone inverse kinematics; the knee points where pelvis and foot point on average.
-fn set_leg(
+/// Two-bone inverse kinematics; the knee points where pelvis and foot point on average. How the shin is turned.
+fn bend_leg(
     side: usize,
     pelvis: Vec3,
     ankle: &AnkleTarget,
     pitch_rad: f32,
     rest: &RestBody,
     rotations: &mut [Quat; JOINT_COUNT],
-) {
+) -> Quat {
     let [hip_joint, knee_joint, ankle_joint] = [1 + side, 4 + side, 7 + side];
     let hip = pelvis + rotations[0] * (rest.joints[hip_joint] - rest.joints[0]);
     let [thigh_m, shin_m] = leg_lengths_m(side, rest);
@@ -186,6 +217,7 @@ fn set_leg(
     rotations[ankle_joint] = shin.inverse() * ankle.rotation;
     // Toes stay flat while the heel rises.
     rotations[10 + side] = Quat::from_rotation_x(-pitch_rad.clamp(0.0, 0.6));
+    shin
 }
 
 fn knee_position(hip: Vec3, ankle: Vec3, [thigh_m, shin_m]: [f32; 2], forward: Vec3) -> Vec3 {

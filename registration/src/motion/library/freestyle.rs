@@ -10,7 +10,7 @@ use super::{
 };
 
 /// From one pose of an arm, of the trunk or of the legs to the next.
-const POSE_SECS: f32 = 1.0;
+const POSE_SECS: f32 = 1.2;
 /// At the start and the end, as a share of the whole.
 const FLANK: f32 = 0.06;
 
@@ -77,7 +77,7 @@ impl Draw<'_> {
 
     /// Every other stance is on both feet: one comes down before the other goes up.
     fn legs(self) -> Legs {
-        let depth = self.between(24, -0.5, 1.0).max(0.0);
+        let depth = self.between(24, -0.5, 0.95).max(0.0);
         let mut legs = Legs { depth, ..Legs::default() };
         if self.pose.is_multiple_of(2) {
             return legs;
