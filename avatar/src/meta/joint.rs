@@ -1,5 +1,7 @@
 //! Stage `Joint`: one hypernetwork for many people, each with a code of their own.
 //!
+//! Limbs come together as in no frame ([`super::composite`]): a pose's effects are learned where they are.
+//!
 //! One part of a person's code is added to the coefficients of every head, so that the shared basis spans both how people
 //! differ and how their surfaces follow the pose. The heads see the other part beside the pose: what a pose does depends
 //! on who it is and what they wear. Fine-tuning finds a new person's code in the coefficients' bias and the network's
@@ -11,6 +13,7 @@ use rayon::prelude::*;
 use super::{
     batch::Batch,
     checkpoint::{Vectors, bytes_of, floats},
+    composite::Composite,
     config::PriorConfig,
     reptile::{person_number, rng_of},
     task::{PersonSource, Prepared},
@@ -140,14 +143,15 @@ impl Learner for Joint {
     ) -> Result<f64, AvatarError> {
         let mut rng = rng_of(config.seed ^ 0x5eed, u64::from(number));
         let chosen = self.choose(config, &mut rng);
-        let (poses, points): (Vec<_>, Vec<_>) = chosen
+        let composite_share = config.joint.composite_share;
+        let frames: Vec<_> = chosen
             .iter()
             .map(|&(person, frame)| {
-                let person = &self.people[person];
-                (person.poses[frame], &person.points[frame])
+                Composite::draw(&self.people[person], frame, composite_share, &mut rng)
             })
-            .unzip();
-        self.batch.draw(&points, config, &mut rng);
+            .collect();
+        self.batch.draw_composites(&frames, config, &mut rng);
+        let poses: Vec<_> = frames.iter().map(|frame| frame.pose).collect();
         let codes: Vec<_> = chosen
             .iter()
             .map(|(person, _)| self.codes[*person].as_slice())
@@ -166,10 +170,11 @@ impl Learner for Joint {
         const PEOPLE: usize = 16;
         const FRAMES: usize = 3;
         const POINTS: usize = 500;
-        let step = self.people.len().div_ceil(PEOPLE);
-        let people = self.people.iter().zip(&self.codes).step_by(step.max(1));
+        // Not every so many in a row: each fourth person may be of another kind.
+        let chosen = (0..PEOPLE.min(self.people.len())).map(|k| k * self.people.len() / PEOPLE);
         let (mut sum, mut count) = (0.0, 0);
-        for (person, code) in people {
+        for number in chosen {
+            let (person, code) = (&self.people[number], &self.codes[number]);
             let frames = person.poses.len().div_ceil(FRAMES).max(1);
             let poses: Vec<_> = person.poses.iter().step_by(frames).copied().collect();
             let codes = vec![code.as_slice(); poses.len()];
@@ -298,6 +303,8 @@ mod tests {
                 frames: 4,
                 steps: 600,
                 people_per_step: 3,
+                // One joint changes the whole ball.
+                composite_share: 0.0,
                 rates: RateConfig { field: 2e-3, trunk: 1e-3, ..JointConfig::default().rates },
                 ..JointConfig::default()
             },

@@ -8,6 +8,7 @@
 mod adapt;
 mod batch;
 mod checkpoint;
+mod composite;
 mod config;
 mod joint;
 mod reptile;

@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use crate::{PoseInput, fine_tune::sampling::KeyframePoints};
+use crate::{PoseInput, fine_tune::sampling::KeyframePoints, pose_input::across};
 
 /// One clothed person.
 #[derive(Clone, Debug)]
@@ -17,6 +17,20 @@ pub struct PersonFrame {
     pub points_in_unit: Vec<Vec3>,
     /// Unit normals, outwards.
     pub normals: Vec<Vec3>,
+}
+
+impl PersonFrame {
+    /// Left is right and right is left.
+    #[must_use]
+    pub fn mirrored(&self) -> Self {
+        let midplane = self.pose.midplane();
+        let points = self.points_in_unit.iter();
+        Self {
+            pose: self.pose.mirrored(),
+            points_in_unit: points.map(|&point| midplane.mirrored(point)).collect(),
+            normals: self.normals.iter().map(|&normal| across(normal)).collect(),
+        }
+    }
 }
 
 /// Makes people: the same number gives the same person, and the same frame number the same pose of theirs.

@@ -17,15 +17,18 @@ use crate::{
     pipeline::{evaluate::evenly_placed, settings::Settings},
 };
 
-/// Of this many training people in a row one is held out, in all they do.
+/// Of this many training people in a row one is held out, in all they do...
 const ONE_IN: usize = 15;
+
+/// ...but no more than so many: judging takes its time.
+const JUDGES_AT_MOST: usize = 5;
 
 /// Frames that fine-tuning sees, from eight sides, and that it is judged on: of other actions, where there are several.
 const FRAMES: usize = 8;
 
 /// Whether a training person judges instead of teaching.
 pub(super) fn is_held_out(index: usize) -> bool {
-    index % ONE_IN == ONE_IN / 2
+    index % ONE_IN == ONE_IN / 2 && index / ONE_IN < JUDGES_AT_MOST
 }
 
 /// Somebody who judges, with a true surface to look at.

@@ -9,10 +9,7 @@ use effigy_avatar::{
     meta::{Person, PersonFrame, PersonSource},
 };
 use effigy_fusion::{TriangleMesh, mesh::sample::sample_surface};
-use effigy_registration::{
-    BodyModel,
-    smpl::{JOINT_COUNT, mirror::MIRROR_JOINT},
-};
+use effigy_registration::{BodyModel, smpl::JOINT_COUNT};
 use effigy_sim_sensor::{
     dataset::{Dataset, Sequence, SequenceEntry},
     population,
@@ -149,11 +146,9 @@ impl PersonSource for ClothPeople {
         let taken = frames.min(all);
         let frame = |index: usize| {
             let frame = &person.frames[(start + index * all / taken) % all];
-            if is_mirrored {
-                mirrored(frame, &person.subject)
-            } else {
-                as_is(frame, &person.subject)
-            }
+            let frame = as_is(frame, &person.subject);
+            // The body model is the same on both sides.
+            if is_mirrored { frame.mirrored() } else { frame }
         };
         Person { frames: (0..taken).map(frame).collect() }
     }
@@ -164,32 +159,6 @@ pub(super) fn as_is(frame: &LearnedFrame, subject: &Subject) -> PersonFrame {
         pose: subject.pose_input(&frame.theta),
         points_in_unit: frame.points.iter().map(|(point, _)| *point).collect(),
         normals: frame.points.iter().map(|(_, normal)| *normal).collect(),
-    }
-}
-
-/// Left is right and right is left; the body model is the same on both sides.
-fn mirrored(frame: &LearnedFrame, subject: &Subject) -> PersonFrame {
-    let unit_box = &subject.unit_box;
-    let across = |v: Vec3| Vec3::new(-v.x, v.y, v.z);
-    let theta = std::array::from_fn(|joint| {
-        // A rotation's axis is a pseudovector.
-        let axis = frame.theta[MIRROR_JOINT[joint]];
-        Vec3::new(axis.x, -axis.y, -axis.z)
-    });
-    PersonFrame {
-        pose: subject.pose_input(&theta),
-        points_in_unit: frame
-            .points
-            .iter()
-            .map(|(point, _)| {
-                unit_box.unit_from_canonical(across(unit_box.canonical_from_unit(*point)))
-            })
-            .collect(),
-        normals: frame
-            .points
-            .iter()
-            .map(|(_, normal)| across(*normal))
-            .collect(),
     }
 }
 
