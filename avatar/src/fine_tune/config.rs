@@ -16,10 +16,7 @@ pub struct FineTuneConfig {
     /// found there comes with what poses do to such clothes.
     pub code_steps: u32,
     pub code_rates: RateConfig,
-    /// The chance that such a step takes a keyframe's mirror image in its place: a left arm that is raised tells who it is as a right
-    /// one does. 0 for never. What comes after them learns from keyframes as they are.
-    pub code_mirrored_share: f32,
-    /// After the search a point this far from the surface of whoever was found counts half, a farther one less, metres: no
+    /// From then on a point this far from the surface of whoever was found counts half, a farther one less, metres: no
     /// clothes are there, the keyframe's pose is wrong. 0 for no doubts.
     pub doubt_m: f32,
     /// Keyframes that a step learns from, drawn anew each time; 0 for all of them. With a few it is all: only where
@@ -51,7 +48,6 @@ impl Default for FineTuneConfig {
             steps: 150,
             code_steps: 75,
             code_rates: RateConfig::of_code(),
-            code_mirrored_share: 0.5,
             doubt_m: 0.02,
             frames_per_step: 0,
             warm_up_steps: 10,

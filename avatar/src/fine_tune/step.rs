@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use glam::Vec3;
-use rand::{RngExt as _, SeedableRng as _, rngs::StdRng};
+use rand::{SeedableRng as _, rngs::StdRng};
 use serde::{Deserialize, Serialize};
 
 use super::{
@@ -19,11 +19,10 @@ use crate::{
     CanonicalSamples, PoseInput,
     error::AvatarError,
     hyper::{HyperNetwork, optimizer::HyperOptimizer},
-    pose_input::across,
     sdf::{
         SirenField,
         batch::FieldFrame,
-        loss::{Known, LossPoint, LossTerms},
+        loss::{LossPoint, LossTerms},
     },
 };
 
@@ -165,7 +164,7 @@ impl FineTuner {
         Ok(())
     }
 
-    /// What the next step learns from, into `points` and `known`; their poses.
+    /// What the next step learns from, into `points` and `known`; the poses of the keyframes taken.
     fn draw(&mut self) -> Vec<PoseInput> {
         let wanted = self.config.frames_per_step;
         let taken = sampling::choose(self.keyframes.len(), wanted, &mut self.rng);
@@ -173,25 +172,7 @@ impl FineTuner {
         for (&keyframe, (points, known)) in taken.iter().zip(drawn) {
             self.keyframes[keyframe].draw(&self.config.sampling, &mut self.rng, points, known);
         }
-        let mut poses: Vec<_> = taken.iter().map(|&keyframe| self.poses[keyframe]).collect();
-        self.mirror_some(&mut poses);
-        poses
-    }
-
-    /// Who it is has no sides; how they are dressed may have.
-    fn mirror_some(&mut self, poses: &mut [PoseInput]) {
-        let share = self.config.code_mirrored_share;
-        if self.code_optimizer.is_none() || share <= 0.0 {
-            return;
-        }
-        for (pose, (points, known)) in poses
-            .iter_mut()
-            .zip(self.points.iter_mut().zip(&mut self.known))
-        {
-            if self.rng.random::<f32>() < share {
-                mirror(pose, points, known);
-            }
-        }
+        taken.iter().map(|&keyframe| self.poses[keyframe]).collect()
     }
 
     /// One Adam step over all keyframes, or as many as a step takes; the loss before it.
@@ -263,20 +244,6 @@ impl FineTuner {
     }
 }
 
-/// Left becomes right and right left.
-fn mirror(pose: &mut PoseInput, points: &mut [Vec3], known: &mut [LossPoint]) {
-    let midplane = pose.midplane();
-    *pose = pose.mirrored();
-    for point in points {
-        *point = midplane.mirrored(*point);
-    }
-    for point in known {
-        if let Known::Surface { normal } = &mut point.known {
-            *normal = across(*normal);
-        }
-    }
-}
-
 /// Each keyframe's field and what is known of it.
 fn frames<'a>(
     parameters: &'a [Vec<f32>],
@@ -311,28 +278,4 @@ fn check(samples: &[CanonicalSamples]) -> Result<(), AvatarError> {
         }
     }
     Ok(())
-}
-
-#[cfg(test)]
-mod tests {
-    use effigy_registration::smpl::JOINT_COUNT;
-    use glam::Mat3;
-
-    use super::*;
-
-    #[test]
-    fn a_mirrored_draw_is_on_the_other_side_and_twice_mirrored_the_same() {
-        let mut rotations = [Mat3::IDENTITY; JOINT_COUNT];
-        rotations[16] = Mat3::from_rotation_z(0.7);
-        let before = PoseInput { rotations, joints_in_unit: [Vec3::X * 0.1; JOINT_COUNT] };
-        let (mut pose, mut points) = (before, [Vec3::new(0.6, 0.2, 0.3)]);
-        let mut known = [LossPoint { known: Known::Surface { normal: Vec3::X }, weight: 1.0 }];
-        mirror(&mut pose, &mut points, &mut known);
-        assert!(pose.rotations[17].abs_diff_eq(Mat3::from_rotation_z(-0.7), 1e-6));
-        assert!(points[0].abs_diff_eq(Vec3::new(-0.4, 0.2, 0.3), 1e-6));
-        assert!(matches!(known[0].known, Known::Surface { normal } if normal == -Vec3::X));
-        mirror(&mut pose, &mut points, &mut known);
-        assert_eq!(pose, before);
-        assert!(points[0].abs_diff_eq(Vec3::new(0.6, 0.2, 0.3), 1e-6));
-    }
 }
