@@ -76,9 +76,9 @@ impl Limb {
         let aside = (joints[shoulder].x - middle).abs();
         let outwards = |x: f32| (x - middle) * (joints[shoulder].x - middle).signum();
         let arm = outwards(joints[shoulder].lerp(joints[elbow], ARM_BEGINS).x);
-        if point.y < legs_y || outwards(point.x) < -ARM_REACHES * aside {
-            Part::Rest
-        } else if outwards(point.x) < aside && point.y > joints[HEAD].y {
+        let is_leg = point.y < legs_y;
+        let is_head = outwards(point.x) < aside && point.y > joints[HEAD].y;
+        if is_leg || is_head || outwards(point.x) < -ARM_REACHES * aside {
             Part::Rest
         } else if outwards(point.x) > arm && point.y > joints[3].y {
             Part::Limb
