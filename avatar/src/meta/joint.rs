@@ -1,6 +1,6 @@
 //! Stage `Joint`: one hypernetwork for many people, each with a code of their own.
 //!
-//! Limbs come together as in no frame ([`super::composite`]): a pose's effects are learned where they are.
+//! Limbs may come together as in no frame ([`super::composite`]).
 //!
 //! One part of a person's code is added to the coefficients of every head, so that the shared basis spans both how people
 //! differ and how their surfaces follow the pose. The heads see the other part beside the pose: what a pose does depends
