@@ -105,11 +105,6 @@ impl KeyframePoints {
             .zip(normals)
             .map(|(&point, &normal)| SurfacePoint { point, normal, weight: 1.0 })
             .collect();
-        Self::of_surface(surface)
-    }
-
-    /// All that is known is a surface, none of it held out.
-    pub(crate) fn of_surface(surface: Vec<SurfacePoint>) -> Self {
         Self { surface, held_out: Vec::new(), free: Vec::new() }
     }
 

@@ -3,7 +3,7 @@
 use glam::Vec3;
 use rand::Rng;
 
-use super::{composite::Composite, config::PriorConfig};
+use super::config::PriorConfig;
 use crate::{
     error::AvatarError,
     fine_tune::sampling::KeyframePoints,
@@ -38,21 +38,6 @@ impl Batch {
         let drawn = self.points.iter_mut().zip(&mut self.known);
         for (frame, (points, known)) in frames.iter().zip(drawn) {
             frame.draw(&config.sampling, rng, points, known);
-        }
-    }
-
-    /// As [`Self::draw`]; where a frame is put together of others, nothing is known of what is between.
-    pub(super) fn draw_composites(
-        &mut self,
-        frames: &[Composite<'_>],
-        config: &PriorConfig,
-        rng: &mut impl Rng,
-    ) {
-        let points: Vec<_> = frames.iter().map(|frame| frame.points.as_ref()).collect();
-        self.draw(&points, config, rng);
-        let drawn = self.points.iter().zip(&mut self.known);
-        for (frame, (points, known)) in frames.iter().zip(drawn) {
-            frame.forget_borders(points, known);
         }
     }
 

@@ -99,9 +99,6 @@ pub struct JointConfig {
     /// People of one step, and poses of each.
     pub people_per_step: usize,
     pub frames_per_person: usize,
-    /// The chance that a frame gets another frame's legs, and the same again for an arm; 0 for frames as they are, which
-    /// is no worse (docs/decisions/0016).
-    pub composite_share: f32,
     /// Rates of a person's code: of its coefficients, and of what the heads see of it.
     pub code_rate: f32,
     pub person_rate: f32,
@@ -120,7 +117,6 @@ impl Default for JointConfig {
             steps: 16_000,
             people_per_step: 4,
             frames_per_person: 2,
-            composite_share: 0.0,
             code_rate: 5e-3,
             person_rate: 2e-2,
             code_penalty: 1e-3,

@@ -1,7 +1,5 @@
 //! Stage `Joint`: one hypernetwork for many people, each with a code of their own.
 //!
-//! Limbs may come together as in no frame ([`super::composite`]).
-//!
 //! One part of a person's code is added to the coefficients of every head, so that the shared basis spans both how people
 //! differ and how their surfaces follow the pose. The heads see the other part beside the pose: what a pose does depends
 //! on who it is and what they wear. Fine-tuning finds a new person's code in the coefficients' bias and the network's
@@ -13,7 +11,6 @@ use rayon::prelude::*;
 use super::{
     batch::Batch,
     checkpoint::{Vectors, bytes_of, floats},
-    composite::Composite,
     config::PriorConfig,
     reptile::{person_number, rng_of},
     task::{PersonSource, Prepared},
@@ -143,15 +140,14 @@ impl Learner for Joint {
     ) -> Result<f64, AvatarError> {
         let mut rng = rng_of(config.seed ^ 0x5eed, u64::from(number));
         let chosen = self.choose(config, &mut rng);
-        let composite_share = config.joint.composite_share;
-        let frames: Vec<_> = chosen
+        let (poses, points): (Vec<_>, Vec<_>) = chosen
             .iter()
             .map(|&(person, frame)| {
-                Composite::draw(&self.people[person], frame, composite_share, &mut rng)
+                let person = &self.people[person];
+                (person.poses[frame], &person.points[frame])
             })
-            .collect();
-        self.batch.draw_composites(&frames, config, &mut rng);
-        let poses: Vec<_> = frames.iter().map(|frame| frame.pose).collect();
+            .unzip();
+        self.batch.draw(&points, config, &mut rng);
         let codes: Vec<_> = chosen
             .iter()
             .map(|(person, _)| self.codes[*person].as_slice())
@@ -303,8 +299,6 @@ mod tests {
                 frames: 4,
                 steps: 600,
                 people_per_step: 3,
-                // One joint changes the whole ball.
-                composite_share: 0.0,
                 rates: RateConfig { field: 2e-3, trunk: 1e-3, ..JointConfig::default().rates },
                 ..JointConfig::default()
             },

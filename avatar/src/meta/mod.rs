@@ -8,7 +8,6 @@
 mod adapt;
 mod batch;
 mod checkpoint;
-mod composite;
 mod config;
 mod joint;
 mod reptile;

@@ -190,7 +190,7 @@ struct AnkleTarget {
     rotation: Quat,
 }
 
-/// Two-bone inverse kinematics; the knee points where pelvis and foot point on average. How the shin is turned.
+/// Two-bone inverse kinematics; the knee points where pelvis and foot point on average. Returns world from shin.
 fn bend_leg(
     side: usize,
     pelvis: Vec3,
