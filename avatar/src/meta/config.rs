@@ -114,7 +114,7 @@ impl Default for JointConfig {
         Self {
             people: 371,
             frames: 56,
-            steps: 16_000,
+            steps: 24_000,
             people_per_step: 4,
             frames_per_person: 2,
             code_rate: 5e-3,

@@ -31,6 +31,10 @@ use crate::{
     say::say,
 };
 
+/// The field alone learns from some 500 surfaces, and bringing one to canonical space takes longer than a step:
+/// these are plenty.
+const FIELD_LOOKS_AT_EVERY: usize = 12;
+
 pub(crate) fn run(args: &TrainArgs) -> anyhow::Result<()> {
     match &args.what {
         TrainWhat::Sdf(args) => field(args),
@@ -40,14 +44,14 @@ pub(crate) fn run(args: &TrainArgs) -> anyhow::Result<()> {
 }
 
 fn field(args: &TrainShared) -> anyhow::Result<()> {
-    let job = Job::new(args)?;
+    let job = Job::new(args, FIELD_LOOKS_AT_EVERY)?;
     estimate::say_field(&job.config);
     let trained = job.run(|training| Ok(train_field(training)?))?;
     job.finish(trained, "sdf", Precision::F32)
 }
 
 fn hyper(args: &TrainHyperArgs) -> anyhow::Result<()> {
-    let job = Job::new(&args.shared)?;
+    let job = Job::new(&args.shared, 1)?;
     let start = read_start(&args.start, &job)?;
     estimate::say_hyper(&job.config);
     let trained = job.run(|training| Ok(train_hyper(&start, training)?))?;
@@ -90,7 +94,8 @@ struct Job<'a> {
 }
 
 impl<'a> Job<'a> {
-    fn new(args: &'a TrainShared) -> anyhow::Result<Self> {
+    /// Learns from every `every`th frame of the data set.
+    fn new(args: &'a TrainShared, every: usize) -> anyhow::Result<Self> {
         let checkpoint = args.checkpoint();
         if checkpoint.exists() && !args.resume {
             bail!(
@@ -100,7 +105,7 @@ impl<'a> Job<'a> {
         }
         files::check_writable(&checkpoint.with_extension("partial"))?;
         let body = builtin::body();
-        let (people, judges) = people(args, &body)?;
+        let (people, judges) = people(args, every, &body)?;
         say!(
             "{} people to learn from in cloth, mirror images included; {} to judge; seed {}",
             people.cloth.as_ref().map_or(0, ClothPeople::count),
@@ -163,7 +168,11 @@ impl<'a> Job<'a> {
 }
 
 /// Those who teach, and those who judge.
-fn people(args: &TrainShared, body: &Arc<BodyModel>) -> anyhow::Result<(People, Vec<Judge>)> {
+fn people(
+    args: &TrainShared,
+    every: usize,
+    body: &Arc<BodyModel>,
+) -> anyhow::Result<(People, Vec<Judge>)> {
     let offsets = OffsetPeople { body: Arc::clone(body), seed: args.seed };
     let Some(path) = &args.data else {
         let described = "people in offset clothes".to_owned();
@@ -192,7 +201,7 @@ fn people(args: &TrainShared, body: &Arc<BodyModel>) -> anyhow::Result<(People, 
             path.display()
         );
     }
-    let cloth = ClothPeople::load(&dataset, &teachers, body, &settings.canonicalise)?;
+    let cloth = ClothPeople::load(&dataset, &teachers, body, &settings.canonicalise, every)?;
     let manifest = dataset.manifest();
     let described = format!("data set {:?} of seed {}", manifest.preset, manifest.seed);
     Ok((

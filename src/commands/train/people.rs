@@ -41,16 +41,17 @@ pub(super) struct ClothPeople {
 }
 
 impl ClothPeople {
-    /// `people`: everything that each of them does.
+    /// `people`: everything that each of them does, of which every `every`th frame is looked at.
     pub(super) fn load(
         dataset: &Dataset,
         people: &[Vec<&SequenceEntry>],
         body: &Arc<BodyModel>,
         canonicalise: &CanonicaliseConfig,
+        every: usize,
     ) -> anyhow::Result<Self> {
         let people = people
             .par_iter()
-            .map(|entries| learned(dataset, entries, body, canonicalise))
+            .map(|entries| learned(dataset, entries, body, canonicalise, every))
             .collect::<anyhow::Result<_>>()?;
         Ok(Self { people })
     }
@@ -81,13 +82,14 @@ fn learned(
     entries: &[&SequenceEntry],
     body: &Arc<BodyModel>,
     config: &CanonicaliseConfig,
+    every: usize,
 ) -> anyhow::Result<Learned> {
     let mut frames = Vec::new();
     let mut subject = None;
     for entry in entries {
         let sequence = dataset.load(entry)?;
         let canonicaliser = Canonicaliser::new(Arc::clone(body), &sequence.betas, config.clone())?;
-        let numbers = 0..sequence.frames.len();
+        let numbers = (0..sequence.frames.len()).step_by(every);
         frames.extend(numbers.map(|frame| frame_of(&sequence, frame, &canonicaliser)));
         subject = Some(*canonicaliser.subject());
     }
