@@ -15,8 +15,20 @@ pub(crate) fn check_writable(path: &Path) -> anyhow::Result<()> {
     explained(opened.map(drop), path)
 }
 
+/// The whole file or none of it: what was there stays until all of the new one is on the disk.
 pub(crate) fn write(path: &Path, content: impl AsRef<[u8]>) -> anyhow::Result<()> {
-    explained(fs::write(path, content), path)
+    // A pipe or a device cannot be replaced, only written to.
+    let is_special = fs::metadata(path).is_ok_and(|found| !found.is_file());
+    if is_special {
+        return explained(fs::write(path, content), path);
+    }
+    let mut part = path.as_os_str().to_owned();
+    part.push(".part");
+    let written = fs::write(&part, content).and_then(|()| fs::rename(&part, path));
+    if written.is_err() {
+        fs::remove_file(&part).ok();
+    }
+    explained(written, path)
 }
 
 /// A text file of at most so many bytes.
@@ -54,4 +66,29 @@ fn explained(result: io::Result<()>, path: &Path) -> anyhow::Result<()> {
             path.display()
         )
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_is_replaced_as_a_whole() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("rows.json");
+        write(&path, "old").unwrap();
+        write(&path, "new").unwrap();
+        assert_eq!(fs::read_to_string(&path).unwrap(), "new");
+        assert_eq!(
+            fs::read_dir(folder.path()).unwrap().count(),
+            1,
+            "nothing else is left"
+        );
+        // Where no file can be, what is in the way stays.
+        let in_the_way = folder.path().join("folder");
+        fs::create_dir(&in_the_way).unwrap();
+        let message = write(&in_the_way, "new").unwrap_err().to_string();
+        assert!(message.contains("folder: cannot write there"), "{message}");
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 2);
+    }
 }

@@ -182,6 +182,7 @@ impl<'a> Whole<'a> {
     }
 
     fn avatar(&self, decode: &FieldDecoder<'_>) -> Result<Avatar, AvatarError> {
+        self.check_subject()?;
         let (layout, count) = (&self.layout, self.header.vertices as usize);
         let triangle_count = self.header.triangles as usize;
         let topology = Topology {
@@ -190,16 +191,37 @@ impl<'a> Whole<'a> {
             triangles: Arc::new(self.triangles(layout.triangles, triangle_count)?),
             skinning: self.skinning(count)?,
         };
-        let field = decode(
-            &self.header.field_kind,
-            &self.bytes[layout.field..layout.crc],
-        )?;
+        let field = &self.bytes[layout.field..layout.crc];
+        let field =
+            decode(&self.header.field_kind, field).map_err(AvatarError::in_file(self.path))?;
         Ok(Avatar {
             subject: self.header.subject,
             field,
             topology_theta: self.header.topology_theta,
             topology,
         })
+    }
+
+    /// Somebody of a size that people have, with numbers that are.
+    fn check_subject(&self) -> Result<(), AvatarError> {
+        /// From a doll to a giant.
+        const SPANS_M: std::ops::RangeInclusive<f32> = 0.1..=10.0;
+        let AvatarHeader { subject, topology_theta, .. } = &self.header;
+        let Subject { unit_box, rest_joints, betas, .. } = subject;
+        let mut vectors = rest_joints
+            .iter()
+            .chain(topology_theta)
+            .chain([&unit_box.center]);
+        let mut numbers = betas.iter().chain([&unit_box.min_m]);
+        if !SPANS_M.contains(&unit_box.span_m) {
+            let what = format!("a body of {} m, expected {SPANS_M:?}", unit_box.span_m);
+            return Err(self.broken(PREFIX_BYTES, what));
+        }
+        if !numbers.all(|number| number.is_finite()) || !vectors.all(|v| v.is_finite()) {
+            let what = "a shape, joints or a pose that are no numbers".to_owned();
+            return Err(self.broken(PREFIX_BYTES, what));
+        }
+        Ok(())
     }
 
     fn vectors(&self, start: usize, count: usize) -> Result<Vec<Vec3>, AvatarError> {
@@ -240,7 +262,8 @@ impl<'a> Whole<'a> {
                 let bones = std::array::from_fn(|slot| self.bytes[bones_at + slot]);
                 let weights = std::array::from_fn(|slot| self.float(weights_at + 4 * slot));
                 let valid = bones.iter().all(|&bone| usize::from(bone) < JOINT_COUNT)
-                    && weights.iter().all(|weight| (0.0..=1.001).contains(weight));
+                    && weights.iter().all(|weight| (0.0..=1.001).contains(weight))
+                    && (weights.iter().sum::<f32>() - 1.0).abs() < 0.01;
                 valid
                     .then_some(VertexWeights { bones, weights })
                     .ok_or_else(|| {
@@ -408,7 +431,11 @@ mod tests {
         let other = Avatar { field: Arc::new(Sphere(0.5)), ..avatar() };
         other.save(&path).unwrap();
         let error = Avatar::load(&path, BodyIdentity([7; 16])).err().unwrap();
-        assert!(matches!(error, AvatarError::UnknownField { .. }), "{error}");
+        let text = error.to_string();
+        assert!(
+            text.contains("a.effigy") && text.contains("\"sphere\""),
+            "{text}"
+        );
     }
 
     #[test]
@@ -476,6 +503,15 @@ mod tests {
         wild = avatar();
         wild.topology.normals[2].y = f32::NAN;
         assert!(read_bytes(&to_bytes(&wild).unwrap()).is_err());
+        wild = avatar();
+        wild.topology.skinning[1].weights = [1.0, 1.0, 0.0, 0.0];
+        assert!(read_bytes(&to_bytes(&wild).unwrap()).is_err());
+        for span_m in [-1.7, 0.0, 1e30] {
+            wild = avatar();
+            wild.subject.unit_box.span_m = span_m;
+            let error = read_bytes(&to_bytes(&wild).unwrap()).err().unwrap();
+            assert!(error.to_string().contains("a body of"), "{error}");
+        }
     }
 
     proptest! {

@@ -1,6 +1,6 @@
 //! What can go wrong with avatars and their files.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use crate::{hyper::HyperConfig, sdf::loss::LossTerms, skinning::network::NetworkConfig};
 
@@ -8,6 +8,8 @@ use crate::{hyper::HyperConfig, sdf::loss::LossTerms, skinning::network::Network
 pub enum AvatarError {
     #[error("{path}: {source}")]
     Io { path: PathBuf, source: std::io::Error },
+    #[error("{path}: {source}")]
+    InFile { path: PathBuf, source: Box<Self> },
     #[error(
         "{path}: not an avatar file (it starts with {found:02x?}, an avatar with \"EFFIGYAV\"); \
          give a file written by this program, usually named *.effigy"
@@ -93,4 +95,11 @@ pub enum AvatarError {
          train them again with this program"
     )]
     SkinningUnknown { config: NetworkConfig },
+}
+
+impl AvatarError {
+    /// For `map_err`: names the file of an error that does not.
+    pub(crate) fn in_file(path: &Path) -> impl FnOnce(Self) -> Self + '_ {
+        move |source| Self::InFile { path: path.to_owned(), source: Box::new(source) }
+    }
 }

@@ -25,6 +25,9 @@ pub struct Calibration {
     pub world_from_camera: Option<Rigid3>,
 }
 
+/// Frames a second of anything from a time lapse to a high-speed camera.
+pub(crate) const RATES_HZ: std::ops::RangeInclusive<f32> = 0.01..=1000.0;
+
 impl Calibration {
     /// Refuses what no camera can be: sizes, focal lengths, ranges and rates that are not finite and positive.
     pub fn check(&self) -> Result<(), CaptureError> {
@@ -42,10 +45,10 @@ impl Calibration {
         let ordered = near.is_finite() && far.is_finite() && 0.0 <= near && near < far;
         check(ordered, "range_m", self.range_m, "0 <= near < far")?;
         check(
-            positive(self.rate_hz),
+            RATES_HZ.contains(&self.rate_hz),
             "rate_hz",
             self.rate_hz,
-            "a positive rate",
+            "0.01 to 1000 frames a second",
         )?;
         check_rigid(self.color_from_depth, "color_from_depth")?;
         check_rigid(

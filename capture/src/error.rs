@@ -21,6 +21,8 @@ pub enum CaptureError {
         got_px[0], got_px[1], expected_px[0], expected_px[1]
     )]
     SizeMismatch { what: &'static str, got_px: [u32; 2], expected_px: [u32; 2] },
+    #[error("{path}: {source}")]
+    InFile { path: PathBuf, source: Box<Self> },
     #[error("the calibration's {field} is {found}, expected {expected}")]
     BadCalibration { field: &'static str, found: String, expected: &'static str },
     #[error("{path} is not a recording: it starts with {found}, expected the 8 bytes of MCAP")]
@@ -54,6 +56,11 @@ pub enum CaptureError {
 }
 
 impl CaptureError {
+    /// For `map_err`: names the file of an error that does not.
+    pub(crate) fn in_file(path: &Path) -> impl FnOnce(Self) -> Self + '_ {
+        move |source| Self::InFile { path: path.to_owned(), source: Box::new(source) }
+    }
+
     /// For `map_err`: an I/O error at a path.
     pub(crate) fn io(path: &Path) -> impl FnOnce(std::io::Error) -> Self + '_ {
         move |source| Self::Io { path: path.to_owned(), source }

@@ -2,7 +2,7 @@
 
 use std::{collections::BTreeMap, path::Path};
 
-use anyhow::{Context as _, ensure};
+use anyhow::{Context as _, bail, ensure};
 use effigy_capture::{
     recording::{Player, Recording},
     source,
@@ -46,7 +46,7 @@ pub(crate) fn open(args: &ReplayArgs) -> anyhow::Result<Input> {
     }
     let recording = Recording::open(&args.input)?;
     let scenario = recording.metadata(SCENARIO_KEY);
-    let truth = scenario.and_then(truth_of);
+    let truth = scenario.and_then(|scenario| truth_of(scenario, &recording));
     let metadata = scenario.map(|text| (SCENARIO_KEY.to_owned(), text.to_owned()));
     let metadata = metadata.into_iter().collect();
     let decided =
@@ -66,9 +66,17 @@ pub(crate) fn open(args: &ReplayArgs) -> anyhow::Result<Input> {
 }
 
 /// What the simulator left there, if it can be made again here.
-fn truth_of(scenario: &str) -> Option<Truth> {
-    let truth = Scenario::from_json(scenario).and_then(|scenario| truth(&scenario));
-    truth
+fn truth_of(scenario: &str, recording: &Recording) -> Option<Truth> {
+    let made = || {
+        let scenario = Scenario::from_json(scenario)?;
+        let slots = scenario.frame_slots();
+        let ids = (0..recording.frame_count()).filter_map(|index| recording.frame_at(index));
+        if let Some((id, _)) = ids.into_iter().find(|(id, _)| id.0 >= slots) {
+            bail!("frame {} is beyond the {slots} of its scenario", id.0);
+        }
+        Ok(truth(&scenario)?)
+    };
+    made()
         .inspect_err(|error| eprintln!("effigy: nothing is compared with the truth: {error}"))
         .ok()
         .flatten()

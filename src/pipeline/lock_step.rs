@@ -27,10 +27,16 @@ pub(crate) fn run(
         stages(source.calibration(), Arc::clone(body), settings, clock);
     let mut log = RunLog::new(clock);
     let mut captured = Captured::default();
+    let mut before = None;
     while !interrupt::requested() {
         let Some(frame) = log.timings.time(&clock, "source", || source.next_frame())? else {
             break;
         };
+        // A sensor that started over, or recordings put together.
+        if before.is_some_and(|before| frame.timestamp < before) {
+            tracking.jumped();
+        }
+        before = Some(frame.timestamp);
         log.delivered(&frame);
         captured.count(&frame, false);
         let tracked = tracking.process(cleaning.process(&frame)?);

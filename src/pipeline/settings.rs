@@ -156,6 +156,16 @@ impl Settings {
             doubt_m.is_finite() && doubt_m >= 0.0,
             "fine_tune.doubt_m is {doubt_m}, expected metres, or 0 for no doubts"
         );
+        let near_deviation = self.fine_tune.sampling.near_deviation;
+        ensure!(
+            near_deviation.is_finite() && near_deviation >= 0.0,
+            "fine_tune.sampling.near_deviation is {near_deviation}, expected a length of unit space, 0 or more"
+        );
+        let min_samples = self.clean.segment.floor.min_samples;
+        ensure!(
+            min_samples >= 3,
+            "clean.segment.floor.min_samples is {min_samples}, expected at least the 3 that make a plane"
+        );
         self.refine.check()?;
         let threads = self.fine_tune.threads.count;
         ensure!(

@@ -51,7 +51,7 @@ pub(super) fn of_folder(
         let [fx, fy, cx, cy] = found.pinhole;
         let camera = Intrinsics { width, height, fx, fy, cx, cy };
         let calibration = kinect_like(camera, found.units_per_metre.unwrap_or(default_units));
-        calibration.check()?;
+        calibration.check().map_err(CaptureError::in_file(&text))?;
         return Ok(calibration);
     }
     let camera = default_camera([width, height]);
@@ -98,14 +98,12 @@ fn read_json(path: &Path, got_px: [u32; 2]) -> Result<Calibration, CaptureError>
             expected: "Effigy's calibration as JSON (`effigy info` of a recording shows one)",
             found: error.to_string(),
         })?;
-    calibration.check()?;
+    calibration.check().map_err(CaptureError::in_file(path))?;
     let Intrinsics { width, height, .. } = calibration.depth.intrinsics;
     if got_px != [width, height] {
-        return Err(CaptureError::SizeMismatch {
-            what: "depth",
-            got_px,
-            expected_px: [width, height],
-        });
+        let expected_px = [width, height];
+        let mismatch = CaptureError::SizeMismatch { what: "depth", got_px, expected_px };
+        return Err(CaptureError::in_file(path)(mismatch));
     }
     Ok(calibration)
 }
@@ -123,7 +121,7 @@ fn read_text(path: &Path) -> Result<Found, CaptureError> {
     parse_text(&text).ok_or_else(|| CaptureError::BadLine {
         path: PathBuf::from(path),
         line: 1,
-        expected: "`fx 525 fy 525 cx 319.5 cy 239.5`, those four numbers alone, or a 3x3 camera matrix",
+        expected: "`fx 525 fy 525 cx 319.5 cy 239.5` and if need be `depth_scale 1000`, those four numbers alone, or a 3x3 camera matrix",
         found: text.chars().take(80).collect(),
     })
 }
@@ -135,13 +133,18 @@ fn parse_text(text: &str) -> Option<Found> {
         .split(separators)
         .filter(|word| !word.is_empty())
         .collect();
-    let after = |label: &str| {
-        let place = words
-            .iter()
-            .position(|word| word.eq_ignore_ascii_case(label))?;
-        words.get(place + 1)?.parse::<f32>().ok()
+    let word_after = |label: &str| {
+        let is_label = |word: &&str| word.eq_ignore_ascii_case(label);
+        let place = words.iter().position(is_label)?;
+        Some(words.get(place + 1).copied().unwrap_or_default())
     };
-    let units_per_metre = after("units_per_metre").or_else(|| after("depth_scale"));
+    let after = |label: &str| word_after(label)?.parse::<f32>().ok();
+    let units_per_metre = match word_after("units_per_metre").or_else(|| word_after("depth_scale"))
+    {
+        None => None,
+        // What is there and no scale must not pass for the default.
+        Some(word) => Some(units_per_metre_of(word)?),
+    };
     let labelled = [after("fx"), after("fy"), after("cx"), after("cy")];
     if let [Some(fx), Some(fy), Some(cx), Some(cy)] = labelled {
         return Some(Found { pinhole: [fx, fy, cx, cy], units_per_metre });
@@ -152,6 +155,13 @@ fn parse_text(text: &str) -> Option<Found> {
         _ => return None,
     };
     Some(Found { pinhole, units_per_metre })
+}
+
+/// Depth units a metre: TUM's 5000, or RealSense's 0.001 metres a unit the other way around.
+fn units_per_metre_of(word: &str) -> Option<f32> {
+    let scale: f32 = word.parse().ok()?;
+    let units = if scale < 1.0 { 1.0 / scale } else { scale };
+    (scale > 0.0 && units.is_finite()).then_some(units)
 }
 
 #[cfg(test)]
@@ -170,6 +180,14 @@ mod tests {
         let scaled = parse_text("fx=525, fy=526, cx=319.5, cy=239.5, depth_scale=5000");
         assert_eq!(scaled.and_then(|found| found.units_per_metre), Some(5000.0));
         assert_eq!(parse_text("focal length 525"), None);
+        let with_scale = |scale: &str| {
+            let text = format!("fx 525 fy 526 cx 319.5 cy 239.5 depth_scale: {scale}");
+            parse_text(&text).map(|found| found.units_per_metre)
+        };
+        assert_eq!(with_scale("0.001"), Some(Some(1000.0)), "metres a unit");
+        for scale in ["-1", "0", "nan", "mm", ""] {
+            assert_eq!(with_scale(scale), None, "{scale:?} is no scale");
+        }
     }
 
     #[test]

@@ -14,7 +14,7 @@ use super::{
     read_depth, read_file,
 };
 use crate::{
-    calibration::Calibration,
+    calibration::{Calibration, RATES_HZ},
     codec::color,
     error::CaptureError,
     frame::Frame,
@@ -174,7 +174,7 @@ fn rate_of(images: &[Listed]) -> Option<f32> {
         .collect();
     gaps.sort_by(f64::total_cmp);
     let median = *gaps.get(gaps.len() / 2)?;
-    (median > 0.0).then_some((1.0 / median) as f32)
+    Some((1.0 / median) as f32).filter(|rate_hz| RATES_HZ.contains(rate_hz))
 }
 
 /// Gives each depth image the colour that is nearest in time.

@@ -5,11 +5,11 @@ use std::{
     io::{self, BufReader, Read, Seek, SeekFrom},
 };
 
-use mcap::{read::ChunkReader, records::Record};
+use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 
 use super::{
     format::{MAX_CHUNK_BYTES, opcode},
-    records::{self, ChunkHeader, MESSAGE_HEADER, MessageHeader, RECORD_HEADER, RecordHeader},
+    records::{ChunkHeader, MESSAGE_HEADER, MessageHeader, RECORD_HEADER, RecordHeader},
 };
 
 /// A chunk has a few messages a frame; with more than this it is not one of a recording of images.
@@ -111,12 +111,15 @@ impl ChunkPlace {
     /// The chunk's records in one piece, checked against its CRC.
     pub(super) fn load(&self, file: &mut BufReader<File>) -> Result<Vec<u8>, Trouble> {
         self.state.clone().map_err(Trouble::Broken)?;
+        if !self.header.compression.is_empty() {
+            let mut record = vec![0; (self.end() - self.at_byte) as usize];
+            file.seek(SeekFrom::Start(self.at_byte))?;
+            file.read_exact(&mut record)?;
+            return unpacked(&record).map_err(Trouble::Broken);
+        }
         let mut stored = vec![0; self.header.compressed_bytes as usize];
         file.seek(SeekFrom::Start(self.data_at()))?;
         file.read_exact(&mut stored)?;
-        if !self.header.compression.is_empty() {
-            return self.decompress(&stored).map_err(Trouble::Broken);
-        }
         let computed = crc32fast::hash(&stored);
         // A CRC of 0 means that the writer made none.
         if self.header.crc != 0 && self.header.crc != computed {
@@ -127,30 +130,36 @@ impl ChunkPlace {
         }
         Ok(stored)
     }
+}
 
-    /// Other tools compress when they rewrite a file: unpacks, checks the CRC, and lays messages and channels one after the
-    /// other again.
-    fn decompress(&self, stored: &[u8]) -> Result<Vec<u8>, String> {
-        let header = mcap::records::ChunkHeader {
-            message_start_time: self.header.start_time,
-            message_end_time: self.header.end_time,
-            uncompressed_size: self.header.uncompressed_bytes,
-            uncompressed_crc: self.header.crc,
-            compression: self.header.compression.clone(),
-            compressed_size: self.header.compressed_bytes,
-        };
-        let mut out = Vec::new();
-        for record in ChunkReader::new(header, stored).map_err(|error| error.to_string())? {
-            match record.map_err(|error| error.to_string())? {
-                Record::Message { header, data } => records::append(&mut out, &header, &data),
-                Record::Channel(channel) => {
-                    records::append_channel(&mut out, channel.id, &channel.topic);
+/// Other tools compress when they rewrite a file: unpacks a chunk record, checks its CRC, and lays messages and channels
+/// one after the other again. No record of it is believed to be longer than a chunk.
+fn unpacked(mut chunk: &[u8]) -> Result<Vec<u8>, String> {
+    let options = LinearReaderOptions::default()
+        .with_skip_start_magic(true)
+        .with_skip_end_magic(true)
+        .with_prevalidate_chunk_crcs(true)
+        .with_record_length_limit(MAX_CHUNK_BYTES as usize);
+    let mut reader = LinearReader::new_with_options(options);
+    let mut out = Vec::new();
+    while let Some(event) = reader.next_event() {
+        match event.map_err(|error| error.to_string())? {
+            LinearReadEvent::ReadRequest(wanted) => {
+                let (next, rest) = chunk.split_at(wanted.min(chunk.len()));
+                reader.insert(next.len()).copy_from_slice(next);
+                reader.notify_read(next.len());
+                chunk = rest;
+            }
+            LinearReadEvent::Record { opcode, data } => {
+                if matches!(opcode, opcode::MESSAGE | opcode::CHANNEL) {
+                    out.push(opcode);
+                    out.extend((data.len() as u64).to_le_bytes());
+                    out.extend(data);
                 }
-                _ => {}
             }
         }
-        Ok(out)
     }
+    Ok(out)
 }
 
 /// A record inside a chunk, as the walk over it finds it.
@@ -206,4 +215,55 @@ pub(super) fn walk(
 pub(super) fn body_of(chunk: &[u8], place: MessagePlace) -> Option<&[u8]> {
     let start = place.at_byte as usize + RECORD_HEADER as usize;
     chunk.get(start..start + place.body_bytes as usize)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A chunk record of what other tools write: `content` in a frame of zstd that leaves it as it is.
+    fn zstd_chunk(content: &[u8]) -> Vec<u8> {
+        let length = u8::try_from(content.len()).unwrap();
+        // Magic number, "one segment, one byte of length", the length; then one block, the last one, raw.
+        let mut packed = vec![0x28, 0xb5, 0x2f, 0xfd, 0x20, length];
+        packed.extend(&((u32::from(length) << 3) | 1).to_le_bytes()[..3]);
+        packed.extend(content);
+        let mut body = Vec::new();
+        body.extend([0; 16]);
+        body.extend((content.len() as u64).to_le_bytes());
+        body.extend(0u32.to_le_bytes());
+        body.extend(4u32.to_le_bytes());
+        body.extend(b"zstd");
+        body.extend((packed.len() as u64).to_le_bytes());
+        body.extend(packed);
+        record(opcode::CHUNK, body.len() as u64, &body)
+    }
+
+    fn record(opcode: u8, body_bytes: u64, body: &[u8]) -> Vec<u8> {
+        let mut record = vec![opcode];
+        record.extend(body_bytes.to_le_bytes());
+        record.extend(body);
+        record
+    }
+
+    #[test]
+    fn records_of_compressed_chunks_are_no_longer_than_they_are() {
+        const ATTACHMENT: u8 = 0x09;
+        let message = record(opcode::MESSAGE, 30, &[7; 30]);
+        let attachment = record(ATTACHMENT, 2, &[0; 2]);
+        let both = [attachment, message.clone()].concat();
+        assert_eq!(unpacked(&zstd_chunk(&both)).unwrap(), message);
+        for body_bytes in [31, 100_000_000, 1 << 50, u64::MAX] {
+            let longer = record(opcode::MESSAGE, body_bytes, &[7; 30]);
+            assert!(unpacked(&zstd_chunk(&longer)).is_err(), "{body_bytes}");
+        }
+        let whole = zstd_chunk(&message);
+        for length in 0..whole.len() {
+            // Nothing at all is no chunk either, but nothing is wrong with it.
+            assert!(
+                length == 0 || unpacked(&whole[..length]).is_err(),
+                "{length}"
+            );
+        }
+    }
 }

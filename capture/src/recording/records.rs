@@ -2,8 +2,6 @@
 
 use std::collections::BTreeMap;
 
-use super::format::opcode;
-
 /// Opcode and length.
 pub(super) const RECORD_HEADER: u64 = 9;
 /// Channel, sequence, log time, publish time.
@@ -170,25 +168,4 @@ pub(super) fn iterate(block: &[u8]) -> impl Iterator<Item = (u8, &[u8])> {
         let length = usize::try_from(fields.u64()?).ok()?;
         Some((opcode, fields.take(length)?))
     })
-}
-
-/// Appends a message record.
-pub(super) fn append(out: &mut Vec<u8>, header: &mcap::records::MessageHeader, data: &[u8]) {
-    out.push(opcode::MESSAGE);
-    out.extend_from_slice(&((MESSAGE_HEADER + data.len()) as u64).to_le_bytes());
-    out.extend_from_slice(&header.channel_id.to_le_bytes());
-    out.extend_from_slice(&header.sequence.to_le_bytes());
-    out.extend_from_slice(&header.log_time.to_le_bytes());
-    out.extend_from_slice(&header.publish_time.to_le_bytes());
-    out.extend_from_slice(data);
-}
-
-/// Appends a channel record with no more than [`channel`] reads.
-pub(super) fn append_channel(out: &mut Vec<u8>, id: u16, topic: &str) {
-    out.push(opcode::CHANNEL);
-    out.extend_from_slice(&((8 + topic.len()) as u64).to_le_bytes());
-    out.extend_from_slice(&id.to_le_bytes());
-    out.extend_from_slice(&0u16.to_le_bytes());
-    out.extend_from_slice(&(topic.len() as u32).to_le_bytes());
-    out.extend_from_slice(topic.as_bytes());
 }

@@ -151,6 +151,9 @@ fn parse(bytes: &[u8]) -> Result<Array, String> {
             return Err(format!("a header of {declared} bytes"));
         }
     }
+    if header_nests(bytes) {
+        return Err("a header that nests deeper than an array's".to_owned());
+    }
     let file = NpyFile::new(bytes).map_err(|error| format!("no NumPy array ({error})"))?;
     let lengths: Option<Vec<usize>> = file
         .shape()
@@ -175,6 +178,18 @@ fn parse(bytes: &[u8]) -> Result<Array, String> {
         data
     };
     Ok(Array { shape, data })
+}
+
+/// Whether an `.npy` file's header has more brackets than the dictionary, the shape and a plain type need: the reader takes
+/// time exponential in how deep they nest.
+pub fn header_nests(bytes: &[u8]) -> bool {
+    const BRACKETS: usize = 8;
+    // After the magic number: version, minor version, length (two bytes in version 1, four later), text to a line's end.
+    let start = if bytes.get(6) == Some(&1) { 10 } else { 12 };
+    let text = bytes.get(start..).unwrap_or_default();
+    let text = text.split(|&byte| byte == b'\n').next().unwrap_or_default();
+    let opens = |byte: &&u8| matches!(byte, b'[' | b'(' | b'{');
+    text.iter().filter(opens).count() > BRACKETS
 }
 
 fn numbers(file: NpyFile<&[u8]>) -> Result<Vec<f64>, String> {
@@ -214,4 +229,35 @@ fn row_major(data: &[f64], shape: &[usize]) -> Vec<f64> {
         }
     }
     out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Version 1 of the format, with this header.
+    fn npy(header: &str, data: &[u8]) -> Vec<u8> {
+        let length = u16::try_from(header.len() + 1).unwrap();
+        let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
+        bytes.extend(length.to_le_bytes());
+        bytes.extend(header.bytes().chain([b'\n']));
+        bytes.extend(data);
+        bytes
+    }
+
+    #[test]
+    fn headers_that_nest_are_not_read() {
+        let header = |descr: &str| {
+            format!("{{'descr': {descr}, 'fortran_order': False, 'shape': (1, 2), }}")
+        };
+        let data = [1.0_f32, 2.0].map(f32::to_le_bytes).concat();
+        let array = parse(&npy(&header("'<f4'"), &data)).unwrap();
+        assert_eq!((array.shape, array.data), (vec![1, 2], vec![1.0, 2.0]));
+        // Each level would double the time: this one would take for ever.
+        for (open, close) in [("[", "]"), ("(", ",)"), ("{", ":0}")] {
+            let nested = format!("{}'<f4'{}", open.repeat(60), close.repeat(60));
+            let problem = parse(&npy(&header(&nested), &data)).err().unwrap();
+            assert!(problem.contains("nests"), "{problem}");
+        }
+    }
 }

@@ -2,6 +2,7 @@
 
 use std::io::{Cursor, Read as _, Write as _};
 
+use effigy_registration::smpl::npz::header_nests;
 use glam::Vec3;
 use npyz::{AutoSerialize, Deserialize, NpyFile, WriterBuilder as _};
 use zip::{ZipArchive, ZipWriter, write::SimpleFileOptions};
@@ -99,6 +100,9 @@ impl<'a> Unpacker<'a> {
         // Versions 2 and 3 declare up to 4 GB of header, which the reader would make room for.
         if bytes.get(6).is_some_and(|&version| version != 1) {
             return Err(wrong("expected version 1 of NumPy's format".to_owned()));
+        }
+        if header_nests(&bytes) {
+            return Err(wrong("its header nests deeper than an array's".to_owned()));
         }
         let file = NpyFile::new(&bytes[..]).map_err(|error| wrong(error.to_string()))?;
         let shape = file.shape().to_vec();

@@ -7,7 +7,7 @@ use glam::Vec3;
 
 use super::{
     archive::Unpacker,
-    packing::{plan, skinning},
+    packing::{betas, plan, skinning},
     sequence::{Sequence, SequenceFrame},
 };
 
@@ -18,7 +18,12 @@ pub(super) fn unpack(zip: &mut Unpacker<'_>) -> Result<Sequence, String> {
         .array::<f32>("offset_step_m", &[1])?
         .first()
         .ok_or("offset_step_m is empty")?;
-    let betas = zip.array::<f32>("betas", &[10])?;
+    if !(step > 0.0 && step <= 1.0) {
+        return Err(format!(
+            "array offset_step_m: expected 0 to 1 m, found {step}"
+        ));
+    }
+    let betas = betas(zip)?;
     let rest_joints = zip.vectors("rest_joints", &[24, 3])?;
     let mean = zip.vectors("mean", &[])?;
     let vertices = mean.len() as u64;
@@ -33,6 +38,9 @@ pub(super) fn unpack(zip: &mut Unpacker<'_>) -> Result<Sequence, String> {
     }
     let triangle_count = triangles.len() as u64 / 3;
     let ids = zip.array::<u64>("id", &[])?;
+    if ids.is_empty() {
+        return Err("array id: expected at least one frame".to_owned());
+    }
     let count = ids.len() as u64;
     let theta = zip.vectors("theta", &[count, 24, 3])?;
     let trans = zip.vectors("trans", &[count, 3])?;
@@ -63,7 +71,7 @@ pub(super) fn unpack(zip: &mut Unpacker<'_>) -> Result<Sequence, String> {
     Ok(Sequence {
         frames: frames.collect(),
         plan,
-        betas: std::array::from_fn(|k| betas[k]),
+        betas,
         rest_joints: std::array::from_fn(|joint| rest_joints[joint]),
         weights,
         layers,

@@ -50,7 +50,7 @@ pub(super) fn unpack(bytes: &[u8]) -> Result<Sequence, String> {
     let plan = plan(zip)?;
     let cloth = serde_json::from_slice(&zip.array::<u8>("cloth", &[])?)
         .map_err(|error| format!("array cloth: {error}"))?;
-    let betas = zip.array::<f32>("betas", &[10])?;
+    let betas = betas(zip)?;
     let rest_joints = zip.vectors("rest_joints", &[24, 3])?;
     let minimal = zip.vectors("minimal", &[])?;
     let layers = zip.array::<u8>("layers", &[])?;
@@ -64,7 +64,7 @@ pub(super) fn unpack(bytes: &[u8]) -> Result<Sequence, String> {
     read_moves(zip, &triangles, vertices, &mut frames)?;
     Ok(Sequence {
         plan,
-        betas: std::array::from_fn(|k| betas[k]),
+        betas,
         rest_joints: std::array::from_fn(|joint| rest_joints[joint]),
         weights: skinning(&bones, &weights)?,
         layers,
@@ -90,6 +90,15 @@ pub(super) fn plan_of(bytes: &[u8]) -> Option<SequencePlan> {
 pub(super) fn plan(zip: &mut Unpacker<'_>) -> Result<SequencePlan, String> {
     serde_json::from_slice(&zip.array::<u8>("plan", &[])?)
         .map_err(|error| format!("array plan: {error}"))
+}
+
+/// The person's shape.
+pub(super) fn betas(zip: &mut Unpacker<'_>) -> Result<[f32; 10], String> {
+    let betas = zip.array::<f32>("betas", &[10])?;
+    if betas.iter().any(|beta| !beta.is_finite()) {
+        return Err("array betas: expected finite numbers".to_owned());
+    }
+    Ok(std::array::from_fn(|k| betas[k]))
 }
 
 /// Four bones and four weights a vertex; weights of any scale are made to sum to one.
@@ -228,6 +237,9 @@ fn read_triangles(zip: &mut Unpacker<'_>, vertices: usize) -> Result<Vec<[u32; 3
 /// Frames whose surfaces are still missing.
 fn read_frames(zip: &mut Unpacker<'_>, triangles: usize) -> Result<Vec<SequenceFrame>, String> {
     let ids = zip.array::<u64>("id", &[])?;
+    if ids.is_empty() {
+        return Err("array id: expected at least one frame".to_owned());
+    }
     let count = ids.len() as u64;
     let theta = zip.vectors("theta", &[count, 24, 3])?;
     let trans = zip.vectors("trans", &[count, 3])?;

@@ -117,8 +117,8 @@ impl Paint {
 
     /// The material at a point of a triangle.
     pub fn at(&self, corners: [usize; 3], weights: Vec3) -> Material {
-        if corners[0] >= self.covers.len() {
-            return self.garment_at(corners[0]);
+        if let Some(&of_cloth) = corners.iter().find(|&&corner| corner >= self.covers.len()) {
+            return self.garment_at(of_cloth);
         }
         let cover: Vec4 = (0..3).map(|k| self.covers[corners[k]] * weights[k]).sum();
         self.outermost(cover)

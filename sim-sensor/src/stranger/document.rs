@@ -40,9 +40,10 @@ impl Document {
         let root: Root = serde_json::from_slice(json).map_err(|error| {
             SimError::character(path, "a glTF 2 file (.glb or .gltf)", &error.to_string())
         })?;
-        let mut buffers = Vec::with_capacity(root.buffers.len());
+        let mut buffers: Vec<Vec<u8>> = Vec::new();
+        let mut left_bytes = MAX_BYTES;
         for (number, buffer) in root.buffers.iter().enumerate() {
-            buffers.push(match (&buffer.uri, binary) {
+            let bytes = match (&buffer.uri, binary) {
                 (None, Some(binary)) if number == 0 => binary.to_vec(),
                 (Some(uri), _) if !uri.contains([':', '/', '\\', '%']) => {
                     bounded(path, &path.with_file_name(uri))?
@@ -58,7 +59,12 @@ impl Document {
                         "data in the file itself or in one beside it; convert it to .glb";
                     return Err(SimError::character(path, expected, &found));
                 }
-            });
+            };
+            left_bytes = left_bytes.checked_sub(bytes.len() as u64).ok_or_else(|| {
+                let expected = format!("buffers of {MAX_BYTES} bytes together at most");
+                SimError::character(path, &expected, "more")
+            })?;
+            buffers.push(bytes);
         }
         Ok(Self { path: path.to_path_buf(), root, buffers })
     }

@@ -13,6 +13,8 @@ use crate::error::SimError;
 
 /// More than any character has.
 const MAX_VERTICES: usize = 1 << 20;
+/// Closed surfaces have two triangles a vertex.
+const MAX_TRIANGLES: usize = 4 * MAX_VERTICES;
 
 /// Vertices as the file binds them.
 #[derive(Clone, Debug, Default)]
@@ -84,7 +86,8 @@ fn read_bones(document: &Document, number: usize, skin: &mut Skin) -> Result<(),
         None => vec![Mat4::IDENTITY.to_cols_array(); found.joints.len()],
     };
     let nodes = document.root.nodes.len();
-    let whole = inverse_binds.len() >= found.joints.len()
+    let whole = !found.joints.is_empty()
+        && inverse_binds.len() >= found.joints.len()
         && found.joints.iter().all(|joint| joint.value() < nodes)
         && u16::try_from(skin.bones.len() + found.joints.len()).is_ok();
     if !whole {
@@ -93,7 +96,7 @@ fn read_bones(document: &Document, number: usize, skin: &mut Skin) -> Result<(),
             found.joints.len(),
             inverse_binds.len()
         );
-        return Err(document.wrong("a bind matrix for each joint of the skin", &counts));
+        return Err(document.wrong("a skin with joints, and a bind matrix for each", &counts));
     }
     for (joint, matrix) in found.joints.iter().zip(&inverse_binds) {
         skin.bones
@@ -172,6 +175,10 @@ fn add_triangles(
             .collect(),
         None => (0..merged.len()).collect(),
     };
+    if triangles.len() + indices.len() / 3 > MAX_TRIANGLES {
+        let expected = format!("at most {MAX_TRIANGLES} triangles");
+        return Err(document.wrong(&expected, "more"));
+    }
     for corners in indices.chunks_exact(3) {
         let corner = |k: usize| merged.get(corners[k]).copied();
         let (Some(a), Some(b), Some(c)) = (corner(0), corner(1), corner(2)) else {

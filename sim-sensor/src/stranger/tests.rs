@@ -276,7 +276,7 @@ fn files_that_hold_nobody_are_told_what_is_missing() {
     cut.extend([
         2, 0, 0, 0, 255, 0, 0, 0, 200, 0, 0, 0, b'J', b'S', b'O', b'N', b'{',
     ]);
-    let cases: [(PathBuf, &str); 6] = [
+    let cases: [(PathBuf, &str); 7] = [
         (
             written("no_skin.gltf", small("", ["a", "b", "c"]).as_bytes()),
             "a mesh with a skin, a character whose bones move it; export it together with its armature",
@@ -287,6 +287,15 @@ fn files_that_hold_nobody_are_told_what_is_missing() {
                 small(r#","skin":0"#, ["a", "b", "c"]).as_bytes(),
             ),
             "as many joints and weights",
+        ),
+        (
+            written(
+                "boneless.gltf",
+                small(r#","skin":0"#, ["a", "b", "c"])
+                    .replace(r#""joints":[0,1,2]"#, r#""joints":[]"#)
+                    .as_bytes(),
+            ),
+            "joints, and a bind matrix for each",
         ),
         (
             written(

@@ -10,8 +10,9 @@ mod skinning;
 
 use std::{fs, path::Path, sync::Arc};
 
-use anyhow::{Context as _, bail};
+use anyhow::{Context as _, bail, ensure};
 use effigy_avatar::{
+    AvatarError,
     hyper::{HyperConfig, HyperNetwork, Precision, Provenance},
     meta::{PersonSource, PriorConfig, Training, Validation, train_field, train_hyper},
 };
@@ -133,11 +134,13 @@ impl<'a> Job<'a> {
             checkpoint: Some(&checkpoint),
             on_event: &mut |event| reporter.take(event),
         })
-        .with_context(|| {
-            format!(
+        .map_err(|error| match error.downcast_ref() {
+            // It says itself what is wrong with the checkpoint.
+            Some(AvatarError::Checkpoint { .. }) => error,
+            _ => error.context(format!(
                 "training stopped; {} holds the last good state",
                 checkpoint.display()
-            )
+            )),
         })?;
         reporter.finish()?;
         Ok(trained)
@@ -218,5 +221,29 @@ fn config(args: &TrainShared) -> anyhow::Result<PriorConfig> {
     if args.preset == TrainPreset::Paper {
         config.network = HyperConfig::PAPER;
     }
+    check(&config)?;
     Ok(config)
+}
+
+/// Refuses what cannot be trained.
+fn check(config: &PriorConfig) -> anyhow::Result<()> {
+    let PriorConfig { reptile, joint, adapt, .. } = config;
+    let counts = [
+        ("reptile.people", reptile.people),
+        ("joint.people", joint.people),
+        ("joint.frames", joint.frames),
+        ("joint.people_per_step", joint.people_per_step),
+        ("joint.frames_per_person", joint.frames_per_person),
+        ("adapt.people", adapt.people),
+        ("adapt.frames", adapt.frames),
+    ];
+    for (name, count) in counts {
+        ensure!(count >= 1, "{name} is 0, expected at least 1");
+    }
+    let near_deviation = config.sampling.near_deviation;
+    ensure!(
+        near_deviation.is_finite() && near_deviation >= 0.0,
+        "sampling.near_deviation is {near_deviation}, expected a length of unit space, 0 or more"
+    );
+    Ok(())
 }

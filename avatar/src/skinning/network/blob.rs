@@ -100,7 +100,8 @@ impl SkinningNetworks {
         let file = fs::File::open(path).map_err(io)?;
         let mut bytes = Vec::new();
         file.take(MOST_BYTES).read_to_end(&mut bytes).map_err(io)?;
-        Self::from_bytes(&bytes)?.of_body(body, path)
+        let networks = Self::from_bytes(&bytes).map_err(AvatarError::in_file(path))?;
+        networks.of_body(body, path)
     }
 
     /// The networks that ship with the program; refused for another body than the built-in one.

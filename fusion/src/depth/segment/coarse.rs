@@ -27,9 +27,13 @@ impl Coarse {
         let center = |cell: usize| {
             let corner = cell / width * CELL_PX * rays.width + cell % width * CELL_PX;
             let opposite = corner + rays.width + 1;
-            rays.on_unit_plane[corner]
-                .midpoint(rays.on_unit_plane[opposite])
-                .extend(1.0)
+            let middle = rays.on_unit_plane[corner].midpoint(rays.on_unit_plane[opposite]);
+            // Where the lens folds no pixel has a ray, and whatever was measured there has no place.
+            if middle.is_finite() {
+                middle.extend(1.0)
+            } else {
+                Vec3::NAN
+            }
         };
         Self {
             width,

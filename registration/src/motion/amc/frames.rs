@@ -10,8 +10,15 @@ pub(super) fn parse(
     text: &str,
     skeleton: &AsfSkeleton,
 ) -> Result<Vec<Vec<f32>>, RegistrationError> {
-    let mut reader =
-        Reader { path, line: 0, skeleton, degrees: true, frames: Vec::new(), filled: 0 };
+    let mut reader = Reader {
+        path,
+        line: 0,
+        skeleton,
+        degrees: true,
+        frames: Vec::new(),
+        number: None,
+        filled: vec![false; skeleton.bones.len()],
+    };
     for line in text.lines() {
         reader.line += 1;
         let line = line.split('#').next().unwrap_or_default().trim();
@@ -34,8 +41,10 @@ struct Reader<'a> {
     skeleton: &'a AsfSkeleton,
     degrees: bool,
     frames: Vec<Vec<f32>>,
-    /// Numbers of the last frame so far.
-    filled: usize,
+    /// What the last frame is called in the file.
+    number: Option<u64>,
+    /// Which bones the last frame has so far.
+    filled: Vec<bool>,
 }
 
 impl Reader<'_> {
@@ -45,16 +54,30 @@ impl Reader<'_> {
             if self.frames.len() >= MAX_FRAMES {
                 return Err(self.error(&format!("at most {MAX_FRAMES} frames"), "one more"));
             }
+            let Ok(number) = line.parse::<u64>() else {
+                return Err(self.error("the number of a frame", line));
+            };
+            let expected = self
+                .number
+                .map_or(number, |before| before.saturating_add(1));
+            if number != expected {
+                return Err(self.error(&format!("frame {expected} next"), line));
+            }
+            self.number = Some(number);
             self.frames.push(vec![0.0; self.skeleton.channel_count]);
-            self.filled = 0;
+            self.filled.fill(false);
             return Ok(());
         }
         let mut words = line.split_whitespace();
         let name = words.next().unwrap_or_default();
         let skeleton = self.skeleton;
-        let Some(bone) = skeleton.bones.iter().find(|bone| bone.name == name) else {
+        let place = skeleton.bones.iter().position(|bone| bone.name == name);
+        let Some((place, bone)) = place.map(|place| (place, &skeleton.bones[place])) else {
             return Err(self.error("a bone of the skeleton", name));
         };
+        if self.filled[place] {
+            return Err(self.error("each bone once a frame", name));
+        }
         let numbers: Option<Vec<f32>> = words
             .map(|word| word.parse().ok().filter(|n: &f32| n.is_finite()))
             .collect();
@@ -79,16 +102,20 @@ impl Reader<'_> {
                 number
             };
         }
-        self.filled += bone.channels.len();
+        self.filled[place] = true;
         Ok(())
     }
 
     fn close_frame(&self) -> Result<(), RegistrationError> {
-        if self.frames.is_empty() || self.filled == self.skeleton.channel_count {
+        if self.frames.is_empty() {
             return Ok(());
         }
-        let expected = format!("a frame of {} numbers", self.skeleton.channel_count);
-        Err(self.error(&expected, &format!("{} of them", self.filled)))
+        let bones = self.skeleton.bones.iter().zip(&self.filled);
+        let mut missing = bones.filter(|(bone, filled)| !**filled && !bone.channels.is_empty());
+        missing.next().map_or(Ok(()), |(bone, _)| {
+            let expected = format!("{} in each frame", bone.name);
+            Err(self.error(&expected, "a frame without"))
+        })
     }
 
     fn error(&self, expected: &str, found: &str) -> RegistrationError {

@@ -115,7 +115,19 @@ fn broken_files_are_told_where_and_what() {
             ASF.to_owned(),
             AMC.replace("lower 0\n", ""),
             "small.amc, line 5",
-            "8 numbers",
+            "lower in each frame",
+        ),
+        (
+            ASF.to_owned(),
+            AMC.replace("lower 0\n", "upper 90\n"),
+            "small.amc, line 6",
+            "once a frame",
+        ),
+        (
+            ASF.to_owned(),
+            format!("{AMC}3\n"),
+            "small.amc, line 7",
+            "frame 2 next",
         ),
         (
             ASF.to_owned(),

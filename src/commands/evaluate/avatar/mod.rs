@@ -85,7 +85,10 @@ pub(super) fn run(args: &EvaluateAvatarArgs, data: &Path) -> anyhow::Result<()> 
     let found = args.json.as_deref().filter(|_| args.resume);
     let mut evaluation = Evaluation {
         args,
-        rows: found.map_or_else(Vec::new, |path| earlier(path, &circumstances)),
+        rows: match found {
+            Some(path) => earlier(path, &circumstances)?,
+            None => Vec::new(),
+        },
         circumstances,
         dataset,
         settings,

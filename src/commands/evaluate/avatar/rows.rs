@@ -1,7 +1,8 @@
 //! What is printed and kept: a row for each avatar and task, and which rows are there already.
 
-use std::{fmt::Write as _, fs, path::Path};
+use std::{fmt::Write as _, fs, io, path::Path};
 
+use anyhow::{Context as _, ensure};
 use serde::{Deserialize, Serialize};
 
 use super::{
@@ -100,15 +101,30 @@ impl Row {
     }
 }
 
-/// Rows of an earlier run under the same circumstances; none if there was no such run.
-pub(crate) fn earlier(path: &Path, now: &Circumstances) -> Vec<Row> {
-    let Ok(text) = fs::read_to_string(path) else {
-        return Vec::new();
+/// Rows of an earlier run under the same circumstances; none if there was no run. Rows of others are not thrown away.
+pub(crate) fn earlier(path: &Path, now: &Circumstances) -> anyhow::Result<Vec<Row>> {
+    let name = || path.display().to_string();
+    let text = match fs::read_to_string(path) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Vec::new()),
+        read => read.with_context(name)?,
     };
-    match serde_json::from_str::<EarlierReport>(&text) {
-        Ok(report) if report.schema == SCHEMA && report.circumstances == *now => report.rows,
-        _ => Vec::new(),
+    // Made to see whether it can be written.
+    if text.is_empty() {
+        return Ok(Vec::new());
     }
+    let report: EarlierReport = serde_json::from_str(&text).with_context(|| {
+        format!(
+            "{}: not a file of this command; name another one with --json",
+            name()
+        )
+    })?;
+    ensure!(
+        report.schema == SCHEMA && report.circumstances == *now,
+        "{}: its rows are of another data set, prior, number of frames or version; name another file with --json, or \
+         leave --resume out to write over it",
+        name()
+    );
+    Ok(report.rows)
 }
 
 pub(crate) fn write(
