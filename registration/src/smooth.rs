@@ -1,16 +1,21 @@
 //! Takes the tremble out of a tracked body: a stage of its own after tracking, adjustable, and nothing when off.
 //!
 //! The One Euro filter (Casiez, Roussel and Vogel 2012) on each joint's rotation and on `trans`: a low-pass whose
-//! cutoff rises with speed. A slow movement lags by about `1 / (2 pi cutoff)`: 0.2 s at 0.8 Hz, which nobody sees
-//! on somebody who stands still; [`OneEuroConfig::lag_secs`] tells it for any speed.
+//! cutoff rises with speed, and with how quiet the sensor is. A slow movement lags by about `1 / (2 pi cutoff)`: 0.2 s
+//! at the 0.8 Hz of a noisy sensor, which nobody sees on somebody who stands still; [`OneEuroConfig::lag_secs`] tells it
+//! for any speed.
+//!
+//! Where a joint trembles, those after it in the chain make up for it: a wrist is tracked better than the angles that
+//! lead to it. If one lagged behind the others it would spoil that, so joints of a chain are let go together.
 
 use effigy_capture::Timestamp;
+use effigy_fusion::CleanFrame;
 use glam::{Quat, Vec3};
 use serde::{Deserialize, Serialize};
 
 use crate::{
     registered::RegisteredFrame,
-    smpl::{BodyParams, JOINT_COUNT},
+    smpl::{BodyParams, JOINT_COUNT, PARENTS},
     state::axis_angle,
 };
 
@@ -27,6 +32,9 @@ pub enum SmoothConfig {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct OneEuroConfig {
+    /// Depth noise that the cutoff at rest and the trembles are meant for. A quieter sensor's tracks tremble less and are
+    /// believed more: in proportion the cutoff is higher and the trembles are smaller, by 8 times at most.
+    pub noisy_m: f32,
     /// Of a body at rest.
     pub rest_cutoff_hz: f32,
     /// How much the cutoff rises with each radian a second beyond the tremble.
@@ -49,10 +57,11 @@ impl Default for SmoothConfig {
 impl Default for OneEuroConfig {
     fn default() -> Self {
         Self {
+            noisy_m: 0.02,
             rest_cutoff_hz: 0.8,
             hz_per_rad_per_sec: 6.0,
             hz_per_metre_per_sec: 30.0,
-            tremble_rad_per_sec: 0.25,
+            tremble_rad_per_sec: 0.4,
             tremble_metres_per_sec: 0.04,
             speed_cutoff_hz: 1.5,
         }
@@ -60,9 +69,20 @@ impl Default for OneEuroConfig {
 }
 
 impl OneEuroConfig {
-    /// How far a joint that turns steadily lags behind.
-    pub fn lag_secs(&self, rad_per_sec: f32) -> f32 {
-        time_constant_secs(self.rotation_cutoff_hz(rad_per_sec))
+    /// How far a joint that turns steadily lags behind, seen with such depth noise.
+    pub fn lag_secs(&self, rad_per_sec: f32, noise_m: f32) -> f32 {
+        time_constant_secs(self.seen_with(noise_m).rotation_cutoff_hz(rad_per_sec))
+    }
+
+    /// The same, its cutoff and trembles as such depth noise asks for.
+    fn seen_with(&self, noise_m: f32) -> Self {
+        let share = (noise_m / self.noisy_m.max(1e-6)).clamp(QUIETEST, 1.0);
+        Self {
+            rest_cutoff_hz: self.rest_cutoff_hz / share,
+            tremble_rad_per_sec: self.tremble_rad_per_sec * share,
+            tremble_metres_per_sec: self.tremble_metres_per_sec * share,
+            ..*self
+        }
     }
 
     fn rotation_cutoff_hz(&self, rad_per_sec: f32) -> f32 {
@@ -73,6 +93,21 @@ impl OneEuroConfig {
     fn trans_cutoff_hz(&self, metres_per_sec: f32) -> f32 {
         let beyond = (metres_per_sec - self.tremble_metres_per_sec).max(0.0);
         self.rest_cutoff_hz + self.hz_per_metre_per_sec * beyond
+    }
+
+    /// Each joint's cutoff by how fast it and those before and after it turn.
+    fn rotation_cutoffs_hz(&self, turning: &[Vec3; JOINT_COUNT]) -> [f32; JOINT_COUNT] {
+        let mut cutoffs_hz = turning.map(|turning| self.rotation_cutoff_hz(turning.length()));
+        // Parents come before their children.
+        for joint in (1..JOINT_COUNT).rev() {
+            let of_child = UP_THE_CHAIN * cutoffs_hz[joint];
+            let parent = &mut cutoffs_hz[PARENTS[joint]];
+            *parent = parent.max(of_child);
+        }
+        for joint in 1..JOINT_COUNT {
+            cutoffs_hz[joint] = cutoffs_hz[joint].max(cutoffs_hz[PARENTS[joint]]);
+        }
+        cutoffs_hz
     }
 }
 
@@ -102,6 +137,10 @@ struct Body {
 
 /// After a longer gap the body is somewhere else.
 const LONGEST_GAP_SECS: f32 = 0.3;
+/// Quieter than this share of a noisy sensor's noise makes no difference.
+const QUIETEST: f32 = 1.0 / 8.0;
+/// What a joint's cutoff is at least, by that of the next one in its chain.
+const UP_THE_CHAIN: f32 = 0.5;
 /// A root that jumps farther between two frames was found anew.
 const JUMP_M: f32 = 0.25;
 
@@ -117,6 +156,8 @@ impl Smoother {
         };
         let memory = self.memory.take();
         let mut params = *frame.params()?;
+        let config =
+            depth_noise_m(&frame.clean).map_or(config, |noise_m| config.seen_with(noise_m));
         let memory = Memory::after(memory, &Body::of(&params), frame.clean.timestamp, &config);
         memory.smooth.write(&mut params);
         self.memory = Some(memory);
@@ -156,9 +197,11 @@ impl Memory {
             let velocity = turn(self.seen.rotations[joint], seen.rotations[joint]) / step_secs;
             let turning = &mut self.turning[joint];
             *turning += (velocity - *turning) * speed_share;
-            let cutoff_hz = config.rotation_cutoff_hz(turning.length());
-            let smooth = &mut self.smooth.rotations[joint];
-            let ahead = turn(*smooth, seen.rotations[joint]) * share(cutoff_hz, step_secs);
+        }
+        let cutoffs_hz = config.rotation_cutoffs_hz(&self.turning);
+        let joints = self.smooth.rotations.iter_mut().zip(&seen.rotations);
+        for ((smooth, seen), cutoff_hz) in joints.zip(cutoffs_hz) {
+            let ahead = turn(*smooth, *seen) * share(cutoff_hz, step_secs);
             *smooth = (Quat::from_scaled_axis(ahead) * *smooth).normalize();
         }
         let velocity = (seen.trans - self.seen.trans) / step_secs;
@@ -180,6 +223,20 @@ impl Body {
         params.theta = self.rotations.map(axis_angle);
         params.trans = self.trans;
     }
+}
+
+/// Standard deviation of the person's depth where it is seen face on, hence among the smallest; `None` where nobody is.
+fn depth_noise_m(clean: &CleanFrame) -> Option<f32> {
+    /// Neighbours are alike.
+    const EVERY: usize = 17;
+    let person = clean.person.iter().zip(&clean.sigma_m).step_by(EVERY);
+    let sigmas = person.filter_map(|(&person, &sigma_m)| person.then_some(sigma_m));
+    let mut sigmas: Vec<f32> = sigmas.filter(|sigma_m| sigma_m.is_finite()).collect();
+    if sigmas.is_empty() {
+        return None;
+    }
+    let rank = sigmas.len() / 10;
+    Some(*sigmas.select_nth_unstable_by(rank, f32::total_cmp).1)
 }
 
 /// The rotation vector from one rotation to another, in the parent's axes.
@@ -223,8 +280,22 @@ mod tests {
         RegisteredFrame { clean: Arc::new(clean), world_from_camera: Rigid3::IDENTITY, tracking }
     }
 
+    /// The same, its person seen with such noise.
+    fn seen_with(noise_m: f32, mut frame: RegisteredFrame) -> RegisteredFrame {
+        let mut clean = (*frame.clean).clone();
+        clean.person = vec![true; 100];
+        clean.sigma_m = vec![noise_m; 100];
+        frame.clean = Arc::new(clean);
+        frame
+    }
+
     fn tracked(elbow: Vec3) -> Tracking {
+        tracked_arm(Vec3::ZERO, elbow)
+    }
+
+    fn tracked_arm(shoulder: Vec3, elbow: Vec3) -> Tracking {
         let mut params = BodyParams::ZERO;
+        params.theta[16] = shoulder;
         params.theta[18] = elbow;
         let joint_confidence = [1.0; JOINT_COUNT];
         Tracking::Tracked { params, residual_rms_m: 0.01, joint_confidence }
@@ -270,14 +341,21 @@ mod tests {
     fn a_steady_turn_lags_as_long_as_is_stated() {
         let config = OneEuroConfig::default();
         let mut smoother = Smoother::new(SmoothConfig::OneEuro(config));
-        for rad_per_sec in [0.5, 1.0, 2.0_f32] {
+        let cases = [
+            (0.5, 0.02),
+            (1.0, 0.02),
+            (2.0, 0.02),
+            (0.5, 0.006),
+            (0.5, 0.001_f32),
+        ];
+        for (rad_per_sec, noise_m) in cases {
             let mut lag_secs = 0.0;
             for number in 0..45 {
                 let angle = rad_per_sec * number as f32 * STEP_SECS as f32 - 1.5;
-                let smooth = elbow(&mut smoother, &frame(number, tracked(Vec3::Y * angle)));
-                lag_secs = (angle - smooth.y) / rad_per_sec;
+                let frame = seen_with(noise_m, frame(number, tracked(Vec3::Y * angle)));
+                lag_secs = (angle - elbow(&mut smoother, &frame).y) / rad_per_sec;
             }
-            let stated_secs = config.lag_secs(rad_per_sec);
+            let stated_secs = config.lag_secs(rad_per_sec, noise_m);
             // A millisecond: single precision over two radians.
             assert!(
                 (lag_secs - stated_secs).abs() < 1e-3,
@@ -289,6 +367,35 @@ mod tests {
                     .is_none()
             );
         }
+    }
+
+    #[test]
+    fn a_quiet_sensor_is_believed() {
+        let config = OneEuroConfig::default();
+        let lag_secs = |noise_m| config.lag_secs(0.1, noise_m);
+        assert!(lag_secs(0.0025) < 0.03 && lag_secs(0.02) > 0.15);
+        assert_eq!(lag_secs(0.1), lag_secs(0.02));
+        assert_eq!(lag_secs(0.0), lag_secs(0.0025));
+    }
+
+    /// A shoulder that turns one way and an elbow that turns slowly back: the hand's direction is known.
+    #[test]
+    fn joints_of_a_chain_are_let_go_together() {
+        let mut smoother = Smoother::new(SmoothConfig::default());
+        let mut lags = [0.0; 2];
+        for number in 0..60 {
+            let secs = number as f32 * STEP_SECS as f32;
+            let [shoulder, elbow] = [1.2, -0.3].map(|rad_per_sec| rad_per_sec * secs);
+            let tracking = tracked_arm(Vec3::Y * shoulder, Vec3::Y * elbow);
+            let theta = smoother
+                .params(&frame(number, tracking))
+                .expect("tracked")
+                .theta;
+            lags = [(shoulder - theta[16].y) / 1.2, (elbow - theta[18].y) / -0.3];
+        }
+        assert!((lags[0] - lags[1]).abs() < 1e-3, "{lags:?}");
+        let alone_secs = OneEuroConfig::default().lag_secs(0.3, 0.02);
+        assert!(lags[1] < 0.5 * alone_secs, "{lags:?}, {alone_secs} alone");
     }
 
     #[test]
