@@ -50,14 +50,19 @@ pub(crate) enum Command {
     /// Say what a recording, a folder, an avatar or a body file holds
     #[command(after_help = "Example: effigy info s.mcap")]
     Info(InfoArgs),
+    /// Print every setting that `--config` takes, with its default
+    #[command(after_help = "Example: effigy settings > mine.toml")]
+    Settings(SettingsArgs),
     /// Play a motion on an avatar and write it for Blender, three.js and others
     #[command(after_help = "Example: effigy export avatar.effigy --motion walk.bvh --glb out.glb")]
     Export(ExportArgs),
     /// Simulate people in clothes, to learn from and to measure with
     #[command(after_help = "Example: effigy dataset make --preset small --out data/small")]
     Dataset(DatasetArgs),
-    /// Make the prior that ships with the program
-    #[command(after_help = "Example: effigy train sdf --data data/prior --out sdf.safetensors")]
+    /// Make a prior like the one that ships with the program, or skinning networks
+    #[command(
+        after_help = "Example: effigy train sdf --data data/prior-actions --offset-people 4 --out sdf.safetensors"
+    )]
     Train(TrainArgs),
     /// Measure how good a part of the program is, on a fixed suite
     #[command(
@@ -261,11 +266,18 @@ pub(crate) enum ImportKind {
 
 #[derive(Debug, Args)]
 pub(crate) struct InfoArgs {
-    /// Any file or folder Effigy reads
+    /// A recording, a folder or single file of depth images, an avatar or a body model
     pub(crate) input: PathBuf,
     /// Write what is printed as JSON too
     #[arg(long, value_name = "FILE")]
     pub(crate) json: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct SettingsArgs {
+    /// With the changes of this file, which is checked
+    #[arg(long, value_name = "FILE")]
+    pub(crate) config: Option<PathBuf>,
 }
 
 #[derive(Debug, Args)]
@@ -395,16 +407,18 @@ pub(crate) struct TrainArgs {
 #[derive(Debug, Subcommand)]
 pub(crate) enum TrainWhat {
     /// Meta-learn the field of a clothed person (the seed paper's algorithm B.1)
-    #[command(after_help = "Example: effigy train sdf --data data/prior --out sdf.safetensors")]
+    #[command(
+        after_help = "Example: effigy train sdf --data data/prior-actions --offset-people 4 --out sdf.safetensors"
+    )]
     Sdf(TrainShared),
     /// Meta-learn the hypernetwork that makes it follow the pose (algorithm B.2)
     #[command(
-        after_help = "Example: effigy train hyper --data data/prior --start sdf.safetensors --out prior.safetensors"
+        after_help = "Example: effigy train hyper --data data/prior-actions --offset-people 4 --start sdf.safetensors --out prior.safetensors"
     )]
     Hyper(TrainHyperArgs),
     /// Train the skinning networks on a data set's training people
     #[command(
-        after_help = "Example: effigy train skinning --data data/prior --out skinning.safetensors"
+        after_help = "Example: effigy train skinning --data data/prior-actions --out skinning.safetensors"
     )]
     Skinning(TrainSkinningArgs),
 }
@@ -448,8 +462,8 @@ pub(crate) struct TrainShared {
     /// The file to write; checkpoint, curves and pictures lie beside it
     #[arg(long)]
     pub(crate) out: PathBuf,
-    /// The data set whose training people are learned from (`effigy dataset make --preset prior`); people in simpler
-    /// clothes if there is none
+    /// The data set whose training people are learned from (`effigy dataset make --preset prior-actions`); people in
+    /// simpler clothes if there is none
     #[arg(long, value_name = "DIR")]
     pub(crate) data: Option<PathBuf>,
     /// Beside a data set: one person of so many is in simpler clothes; 0 for none
@@ -563,8 +577,12 @@ pub(crate) enum Protocol {
 #[derive(Debug, Subcommand)]
 pub(crate) enum EvaluateWhat {
     /// How well bodies are found and followed: simulated people that nothing was tuned on
+    #[command(after_help = "Example: effigy evaluate tracking --quick --json tracking.json")]
     Tracking(EvaluateTrackingArgs),
     /// How far from their true places points of test people land in star pose
+    #[command(
+        after_help = "Example: effigy evaluate skinning --data data/cape-like --md skinning.md"
+    )]
     Skinning(EvaluateSkinningArgs),
 }
 
@@ -598,7 +616,8 @@ pub(crate) struct EvaluateTrackingArgs {
     /// One person, two outfits, the beginning of each movement
     #[arg(long)]
     pub(crate) quick: bool,
-    /// Also without the cloth term, without visibility, without the temporal term, and by another tracker's recipe
+    /// Also without the cloth term, without visibility, without the temporal term, by another tracker's recipe, and told
+    /// each frame's true surface
     #[arg(long)]
     pub(crate) ablation: bool,
     /// Other people than the test split's: tune on these, never on those

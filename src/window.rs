@@ -2,7 +2,7 @@
 
 use std::{
     panic::resume_unwind,
-    path::PathBuf,
+    path::{Path, PathBuf},
     sync::{
         Arc,
         atomic::{AtomicBool, Ordering},
@@ -30,14 +30,21 @@ pub(crate) enum Shown {
 }
 
 /// Shows the window while `pipeline` runs beside it; closing the window ends the pipeline in order.
+///
+/// `pictures`: the folder that the window's own button saves into.
 pub(crate) fn show(
     picture: Option<(PathBuf, f32)>,
+    pictures: &Path,
     exit_after_secs: Option<f32>,
     pipeline: impl FnOnce(Arc<SnapshotSlot>, Controls) -> anyhow::Result<()> + Send,
 ) -> anyhow::Result<Shown> {
     let slot = Arc::new(SnapshotSlot::new());
     let (sender, commands) = command_channel(COMMANDS);
-    let options = ViewerOptions { screenshot: picture, exit_after_secs, screenshot_folder: None };
+    let options = ViewerOptions {
+        screenshot: picture,
+        exit_after_secs,
+        screenshot_folder: Some(pictures.to_owned()),
+    };
     let no_window = AtomicBool::new(false);
     thread::scope(|scope| {
         let shared = Arc::clone(&slot);

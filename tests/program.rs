@@ -464,7 +464,11 @@ fn keyframes_without_a_point_near_the_body_are_an_error_that_says_so() {
     let arguments = ["replay", "s.mcap", "--headless", "--keyframes", "2"];
     let files = ["--config", "near.toml", "--out", "out"];
     let output = effigy(here, &[&arguments[..], &files].concat());
-    assert_fails(&output, DATA, &["none of its 0 points", "better fit"]);
+    assert_fails(
+        &output,
+        DATA,
+        &["can be learned from", "too far from the body", "better fit"],
+    );
 }
 
 #[test]

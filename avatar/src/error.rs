@@ -2,7 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::{hyper::HyperConfig, sdf::loss::LossTerms, skinning::network::NetworkConfig};
+use crate::{
+    canonicalise::CanonicaliseCounts, hyper::HyperConfig, sdf::loss::LossTerms,
+    skinning::network::NetworkConfig,
+};
 
 #[derive(Debug, thiserror::Error)]
 pub enum AvatarError {
@@ -31,8 +34,6 @@ pub enum AvatarError {
     OtherBody { path: PathBuf, found: String, expected: String },
     #[error("a field of kind {found:?} cannot be read back here, only {expected:?}")]
     UnknownField { found: String, expected: String },
-    #[error("the field's parameters cannot be read: {0}")]
-    FieldParameters(String),
     #[error(
         "the field has no surface in the unit box at resolution {resolution}: \
          it has not learned a body; fine-tune longer or start from the shipped prior"
@@ -70,10 +71,16 @@ pub enum AvatarError {
     )]
     SampleCounts { keyframe: usize, points: usize, normals: usize, weights: usize },
     #[error(
-        "keyframe {keyframe}: none of its {points} points passed the re-projection test; \
-         choose a frame with a better fit"
+        "keyframe {keyframe}: none of its {points} points has a say; choose a frame with a better fit"
     )]
     EmptyKeyframe { keyframe: usize, points: usize },
+    #[error(
+        "keyframe {keyframe}: none of its {} points can be learned from: {} are too far from the body, {} are where a \
+         hand is near something else, {} do not come back by skinning and {} are outside the box; choose a frame with \
+         a better fit",
+        counts.observed, counts.far_from_body, counts.in_contact, counts.not_returned, counts.outside_box
+    )]
+    NothingCanonical { keyframe: usize, counts: CanonicaliseCounts },
     #[error("keyframe {keyframe} holds numbers that are not finite")]
     KeyframeNotFinite { keyframe: usize },
     #[error("the loss is not finite at step {step} ({terms:?}); lower the rates")]

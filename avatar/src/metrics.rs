@@ -9,7 +9,7 @@ use glam::Vec3;
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use serde::{Deserialize, Serialize};
 
-/// MetaAvatar's three measures (seed-systems.md 1.10): from masked truth vertices to the prediction only.
+/// MetaAvatar's three measures, as its code computes them: from masked truth vertices to the prediction only.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct SurfaceMetrics {
     /// Mean distance to the nearest predicted vertex; depends on how dense the prediction is.

@@ -4,7 +4,7 @@ use std::{any::Any, path::Path, sync::Arc};
 
 use effigy_fusion::TriangleMesh;
 use effigy_registration::{
-    BodyModel, BodyParams,
+    BodyModel,
     smpl::{BodyIdentity, JOINT_COUNT, UnitBox, VertexWeights, star_transforms},
 };
 use glam::{Affine3A, Vec3};
@@ -140,11 +140,6 @@ impl Avatar {
             .iter()
             .map(|weights| rest_from_canonical(&star, weights))
             .collect()
-    }
-
-    /// These parameters with this avatar's own shape.
-    pub fn with_own_shape(&self, params: &BodyParams) -> BodyParams {
-        BodyParams { betas: self.subject.betas, ..*params }
     }
 }
 

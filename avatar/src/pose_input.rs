@@ -6,7 +6,7 @@ use effigy_registration::smpl::{
 use glam::{Mat3, Vec3};
 
 /// 24 rotations, the root's replaced by identity, and the zero-pose joints in unit space
-/// (seed-systems: bone encoder, 216 + 72 numbers).
+/// (what MetaAvatar's bone encoder takes: 216 + 72 numbers).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PoseInput {
     pub rotations: [Mat3; JOINT_COUNT],

@@ -13,8 +13,10 @@ pub struct CanonicalSamples {
     pub points_in_unit: Vec<Vec3>,
     /// Unit normals at the points, outwards; zero where the sensor gave none.
     pub normals: Vec<Vec3>,
-    /// Say of each point: 0 for one that failed the re-projection test, else by the sensor's sigma.
+    /// Say of each point by the sensor's sigma and the slant of its surface; those that failed the re-projection test are
+    /// not among them.
     pub weights: Vec<f32>,
-    /// Points that the sensor saw to be empty, between camera and surface: the field is positive there.
+    /// Points that the sensor saw to be empty, between camera and surface or beside the person: the field is positive
+    /// there.
     pub free_in_unit: Vec<Vec3>,
 }

@@ -35,10 +35,6 @@ impl DepthImage {
     pub fn pixels(&self) -> &[u16] {
         &self.data
     }
-
-    pub fn into_pixels(self) -> Vec<u16> {
-        self.data
-    }
 }
 
 impl ColorImage {

@@ -59,19 +59,24 @@ pub struct EnergyConfig {
     pub contradiction_m: f32,
     /// How far the mask's rim is worn, so that less than this outside is no contradiction.
     pub silhouette_slack_m: f32,
+    /// What it is worth that the pose is one that people take.
     pub pose_prior_weight: f32,
+    /// What it is worth that the body goes on as it did.
     pub temporal_weight: f32,
     /// Depth noise that doubles the weight for a joint at rest: the noisier a frame, the less it tells of its own.
     pub still_noise_m: f32,
     /// A joint's turn against the prediction that costs one.
     pub temporal_rotation_rad: f32,
+    /// A root's way against the prediction that costs one.
     pub temporal_trans_m: f32,
+    /// A vertex this far under the floor costs one.
     pub floor_m: f32,
     /// What each of the feet's vertices is worth that is under the floor.
     pub floor_weight: f32,
     /// What the lower foot's standing on the floor is worth, and how exactly it does.
     pub standing_weight: f32,
     pub standing_m: f32,
+    /// A joint this far beyond its limit costs one.
     pub joint_limit_rad: f32,
     /// What it is worth that no leg is inside the other, and how exactly that is known.
     pub contact_weight: f32,

@@ -72,7 +72,7 @@ pub(crate) fn run(
             .clone()
             .map(|path| (path, args.screenshot_after));
         let exit_after_secs = args.exit_after;
-        let shown = window::show(picture, exit_after_secs, |slot, controls| {
+        let shown = window::show(picture, &args.out, exit_after_secs, |slot, controls| {
             // A window shows things as they happen.
             let input = Input { pace: Pace::RealTime, ..open(true)? };
             run_chain(input, args, Some(slot), &controls)

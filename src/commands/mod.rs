@@ -10,5 +10,6 @@ pub(crate) mod import;
 pub(crate) mod info;
 pub(crate) mod replay;
 pub(crate) mod scene;
+pub(crate) mod settings;
 pub(crate) mod simulate;
 pub(crate) mod train;

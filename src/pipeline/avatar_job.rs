@@ -13,7 +13,7 @@ use std::{
 use anyhow::{Context as _, anyhow};
 use crossbeam::channel::{Receiver, RecvTimeoutError, Select, Sender, TryRecvError, bounded};
 use effigy_avatar::{
-    Avatar, CanonicalSamples, Canonicaliser, DriveConfig, Driver, MapConfig, ShapeMap,
+    Avatar, AvatarError, CanonicalSamples, Canonicaliser, DriveConfig, Driver, MapConfig, ShapeMap,
     TopologyConfig,
     fine_tune::{FineTuneProgress, FineTuner},
     hyper::HyperNetwork,
@@ -344,10 +344,17 @@ impl Work {
         let Self { body, camera, settings, .. } = self;
         let refined = Refinement { body, camera, canonicaliser, prior, settings }
             .refined(&tracked, on_step)?;
-        let samples = refined
-            .iter()
-            .filter_map(|keyframe| Some(canonicaliser.process(keyframe)?.0));
-        Ok(samples.collect())
+        let mut samples = Vec::with_capacity(refined.len());
+        for (number, keyframe) in refined.iter().enumerate() {
+            let Some((points, counts)) = canonicaliser.process(keyframe) else {
+                continue;
+            };
+            if counts.kept == 0 {
+                return Err(AvatarError::NothingCanonical { keyframe: number, counts }.into());
+            }
+            samples.push(points);
+        }
+        Ok(samples)
     }
 
     /// What drives an avatar, and how far its map is from the field if it has one: only what is near enough drives

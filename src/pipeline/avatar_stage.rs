@@ -19,6 +19,10 @@ use super::{
     track_stage::{Followed, Handover},
 };
 
+/// More frames than lie between tracking and driving: what one tells the other takes effect after as many, in a replay at
+/// the same one.
+const AHEAD: u64 = 8;
+
 pub(crate) struct AvatarStage {
     body: Arc<BodyModel>,
     camera: CameraModel,
@@ -33,6 +37,8 @@ pub(crate) struct AvatarStage {
     /// What was shown while the first avatar was still learned.
     preview: Option<(Arc<Avatar>, PreviewFigures)>,
     gave_up: bool,
+    /// Frames to come that still show the last person's shape.
+    of_last_person: u64,
     /// Whether the chain loses frames as it is.
     overloaded: bool,
     /// What the user asked for since the last frame.
@@ -83,6 +89,7 @@ impl AvatarStage {
             made: None,
             preview: None,
             gave_up: false,
+            of_last_person: 0,
             overloaded: false,
             requests: Vec::new(),
             learned_from: BTreeSet::new(),
@@ -97,8 +104,12 @@ impl AvatarStage {
         registered: &RegisteredFrame,
     ) -> anyhow::Result<Vec<Decision>> {
         let selector = &mut self.selector;
-        self.timings
-            .time(&self.clock, "keyframes", || selector.consider(registered));
+        if self.of_last_person == 0 {
+            self.timings
+                .time(&self.clock, "keyframes", || selector.consider(registered));
+        } else {
+            self.of_last_person -= 1;
+        }
         if let Some(making) = &mut self.making {
             making.frames_since_begun += 1;
         }
@@ -117,29 +128,25 @@ impl AvatarStage {
         Ok(decided)
     }
 
-    /// Has tracking follow a new avatar's surface, or the bare body again, as far as the settings want that. `number` is
-    /// that of the frame that was decided at.
-    pub(crate) fn hand_surface_over(
+    /// Tells tracking that somebody else is there now, and has it follow a new avatar's surface if the settings want that.
+    /// `number` is that of the frame that was decided at.
+    pub(crate) fn hand_over(
         &self,
         decided: &[Decision],
         number: u64,
         hand_over: &Sender<Handover>,
     ) {
-        /// More frames than lie between tracking and driving: a replay must begin at the same one.
-        const AHEAD: u64 = 8;
-        if !self.settings.schedule.follow_avatar {
-            return;
-        }
-        let surface = |decision: &Decision| match (decision, &self.made) {
-            (Decision::TakeOver, Some(made)) if !made.is_preview => Some(Followed::Avatar(
-                offsets_from_body(made.driver.avatar(), &self.body),
-            )),
-            (Decision::StartOver, _) => Some(Followed::BareBody),
+        let follows_avatar = self.settings.schedule.follow_avatar;
+        let whom = |decision: &Decision| match (decision, &self.made) {
+            (Decision::TakeOver, Some(made)) if follows_avatar && !made.is_preview => Some(
+                Followed::Avatar(offsets_from_body(made.driver.avatar(), &self.body)),
+            ),
+            (Decision::StartOver, _) => Some(Followed::NewPerson),
             _ => None,
         };
-        if let Some(surface) = decided.iter().rev().find_map(surface) {
-            // Tracking that has ended follows nothing.
-            drop(hand_over.send(Handover { from: number + AHEAD, surface }));
+        if let Some(whom) = decided.iter().rev().find_map(whom) {
+            // Tracking that has ended follows nobody.
+            drop(hand_over.send(Handover { from: number + AHEAD, whom }));
         }
     }
 
@@ -300,6 +307,7 @@ impl AvatarStage {
             Decision::StartOver => {
                 self.selector.clear();
                 (self.making, self.made, self.gave_up) = (None, None, false);
+                self.of_last_person = AHEAD;
                 self.preview = None;
                 Ok(())
             }

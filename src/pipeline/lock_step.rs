@@ -43,7 +43,7 @@ pub(crate) fn run(
         let registered = &tracked.registered;
         log.registered(&tracked);
         let decided = avatar.advance(registered)?;
-        avatar.hand_surface_over(&decided, tracked.number, &hand_over);
+        avatar.hand_over(&decided, tracked.number, &hand_over);
         let mesh = avatar.drive(registered);
         outputs.record(&frame, &decided)?;
         outputs.frame(&frame, registered, mesh.as_ref(), (avatar, &log))?;

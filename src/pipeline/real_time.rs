@@ -305,7 +305,7 @@ fn drive(
         log.playback = delivered.playback;
         avatar.note_load(load.is_too_high(delivered.dropped_so_far));
         let decided = avatar.advance(registered)?;
-        avatar.hand_surface_over(&decided, tracked.number, hand_over);
+        avatar.hand_over(&decided, tracked.number, hand_over);
         let mesh = avatar.drive(registered);
         let latency = log.clock.now().saturating_sub(delivered.at);
         log.latency(latency, (was_making, mesh.is_some()));

@@ -33,18 +33,19 @@ pub(crate) struct TrackStage {
     next_handover: Option<Handover>,
 }
 
-/// A surface to follow from a frame on.
+/// What to follow from a frame on.
 pub(crate) struct Handover {
     /// Counted as they are tracked, from 1.
     pub(crate) from: u64,
-    pub(crate) surface: Followed,
+    pub(crate) whom: Followed,
 }
 
-/// What is followed.
+/// Who is followed.
 pub(crate) enum Followed {
-    /// For each of the body's vertices how far the surface is from it, in canonical space.
+    /// The avatar's surface: for each of the body's vertices how far it is from there, in canonical space.
     Avatar(Vec<Vec3>),
-    BareBody,
+    /// Somebody of whom nothing is known yet.
+    NewPerson,
 }
 
 /// A cleaned frame and what it took.
@@ -115,7 +116,7 @@ impl TrackStage {
     pub(crate) fn process(&mut self, cleaned: CleanedFrame) -> TrackedFrame {
         self.give_back();
         self.count += 1;
-        self.take_surface();
+        self.take_over();
         let start = self.clock.now();
         let registered = Arc::new(self.tracker.process(Arc::new(cleaned.clean)));
         self.recent.push_back(Arc::clone(&registered));
@@ -127,21 +128,21 @@ impl TrackStage {
         }
     }
 
-    /// Follows another surface if it is time to.
-    fn take_surface(&mut self) {
+    /// Follows another surface or another person if it is time to.
+    fn take_over(&mut self) {
         self.next_handover = self
             .handovers
             .try_iter()
             .last()
             .or(self.next_handover.take());
         let due = |next: &mut Handover| next.from <= self.count;
-        match self.next_handover.take_if(due).map(|next| next.surface) {
+        match self.next_handover.take_if(due).map(|next| next.whom) {
             Some(Followed::Avatar(offsets)) => {
                 if let Err(error) = self.tracker.set_surface(&offsets) {
                     tracing::warn!(%error, "the avatar's surface is not followed");
                 }
             }
-            Some(Followed::BareBody) => self.tracker.forget_surface(),
+            Some(Followed::NewPerson) => self.tracker.forget_person(),
             None => {}
         }
     }

@@ -26,10 +26,15 @@ struct Scene {
 impl Scene {
     /// Frames `ids` of a routine at 30 Hz.
     fn new(routine: Routine, outfit: OutfitKind, ids: impl Iterator<Item = u64>) -> Self {
+        Self::of(3, routine, outfit, ids)
+    }
+
+    /// The same of another person.
+    fn of(seed: u64, routine: Routine, outfit: OutfitKind, ids: impl Iterator<Item = u64>) -> Self {
         let scenario = Scenario {
             motion: MotionChoice::Routine(routine),
             outfit,
-            seed: 3,
+            seed,
             ..Scenario::default()
         };
         let body = builtin::body();
@@ -62,6 +67,17 @@ impl Scene {
             .map(|(a, b)| (into_truth * *a).distance(*b))
             .sum();
         Some(1e3 * sum / fitted.vertices.len() as f32)
+    }
+
+    /// Of a body in the zero pose.
+    fn height_m(&self, betas: &[f32; 10]) -> f32 {
+        let vertices = self.body.shaped_vertices(betas);
+        let ys = vertices.iter().map(|v| v.y);
+        ys.clone().fold(f32::MIN, f32::max) - ys.fold(f32::MAX, f32::min)
+    }
+
+    fn true_height_m(&self) -> f32 {
+        self.height_m(&self.truth.person().betas)
     }
 
     /// Tracks all frames; the mean error, and the share of frames tracked.
@@ -234,13 +250,35 @@ fn the_estimated_height_is_right_to_three_centimetres() {
     for frame in &scene.frames {
         tracker.process(Arc::clone(frame));
     }
-    let height_m = |betas: &[f32; 10]| {
-        let vertices = scene.body.shaped_vertices(betas);
-        let ys = vertices.iter().map(|v| v.y);
-        ys.clone().fold(f32::MIN, f32::max) - ys.fold(f32::MAX, f32::min)
-    };
-    let error_m = height_m(&tracker.betas()) - height_m(&scene.truth.person().betas);
+    let error_m = scene.height_m(&tracker.betas()) - scene.true_height_m();
     // Shoes (16 mm) and hair (12 mm) look like height.
+    assert!(error_m.abs() < 0.03, "off by {error_m} m");
+}
+
+#[test]
+fn somebody_else_is_measured_anew() {
+    let scene = |seed: u64, frames: u64| {
+        Scene::of(
+            seed,
+            Routine::TurnAround,
+            OutfitKind::CloseFitting,
+            0..frames,
+        )
+    };
+    let first = scene(3, 60);
+    let mut tracker = first.tracker();
+    for frame in &first.frames {
+        tracker.process(Arc::clone(frame));
+    }
+    let apart_m = |other: &Scene| (other.true_height_m() - first.true_height_m()).abs();
+    let seed = (4..40).find(|&seed| apart_m(&scene(seed, 0)) > 0.10);
+    let other = scene(seed.expect("people differ"), 60);
+    tracker.forget_person();
+    assert_eq!(tracker.betas(), [0.0; 10]);
+    for frame in &other.frames {
+        tracker.process(Arc::clone(frame));
+    }
+    let error_m = other.height_m(&tracker.betas()) - other.true_height_m();
     assert!(error_m.abs() < 0.03, "off by {error_m} m");
 }
 

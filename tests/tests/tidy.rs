@@ -56,6 +56,19 @@ fn files_introduce_themselves() {
     );
 }
 
+/// Notes that nobody has who has the sources.
+#[test]
+fn nothing_leans_on_papers_that_are_not_here() {
+    let elsewhere = ["seed-systems", "design.md", "ml-backend.md", "style.md"];
+    for (name, _) in MAY_DEPEND_ON {
+        visit(&root().join(name), &mut |path, text| {
+            for words in elsewhere {
+                assert!(!text.contains(words), "{} names {words}", path.display());
+            }
+        });
+    }
+}
+
 fn visit(folder: &Path, check: &mut dyn FnMut(&Path, &str)) {
     for entry in fs::read_dir(folder).expect("the folder is part of the workspace") {
         let path = entry.expect("the folder can be listed").path();

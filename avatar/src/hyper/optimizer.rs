@@ -14,7 +14,7 @@ use crate::nn::{
     linear::sum_of_rows,
 };
 
-/// Mean hidden activation after `LayerNorm` and `ReLU` (seed-systems 1.3).
+/// Mean hidden activation after `LayerNorm` and `ReLU`: 1 / sqrt(2 pi).
 const MEAN_ACTIVATION: f32 = 0.4;
 /// A coefficient's least assumed size, for a basis whose coefficients are still zero.
 const LEAST_COEFFICIENT: f32 = 0.3;

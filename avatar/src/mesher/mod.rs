@@ -22,7 +22,7 @@ pub use relax::relax;
 /// The largest piece of the zero level in `[-1, 1]^3`, normals included; empty if there is none.
 ///
 /// The lattice has `resolution` points a side, both ends included: spacing `2 / (resolution - 1)`
-/// (seed-systems.md 1.9). A surface that leaves the cube is closed at the cube's wall.
+/// (as MetaAvatar meshes). A surface that leaves the cube is closed at the cube's wall.
 pub fn extract(sdf: &dyn SignedDistanceField, resolution: usize) -> TriangleMesh {
     let resolution = resolution.clamp(4, MAX_RESOLUTION);
     let mut lattice = Lattice::new(sdf, resolution);

@@ -91,7 +91,7 @@ impl Default for ReptileConfig {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct JointConfig {
-    /// People that are learned together.
+    /// People that are learned together; 0 is for whoever asks for the training to replace by all that there are.
     pub people: usize,
     /// Poses of each.
     pub frames: usize,
@@ -112,7 +112,7 @@ pub struct JointConfig {
 impl Default for JointConfig {
     fn default() -> Self {
         Self {
-            people: 371,
+            people: 0,
             frames: 56,
             steps: 24_000,
             people_per_step: 4,

@@ -42,7 +42,7 @@ impl Joint {
         let mut rng = rng_of(config.seed, u64::MAX);
         let meta = SirenField::new(config.network.field, phi);
         let network = HyperNetwork::init(config.network, &meta, &mut rng);
-        let people: Vec<_> = (0..config.joint.people as u64)
+        let people: Vec<_> = (0..config.joint.people.max(1) as u64)
             .into_par_iter()
             .map(|index| {
                 Prepared::new(&source.person(person_number(500_000 + index), config.joint.frames))

@@ -2,7 +2,8 @@
 
 use super::layout::{Layout, Start};
 
-/// `scale * (x - mean) / sqrt(variance + 1e-5) + shift` with the unbiased variance (seed-systems.md 1.5).
+/// `scale * (x - mean) / sqrt(variance + 1e-5) + shift` with the unbiased variance (Wu and He 2018, as in
+/// convolutional occupancy networks' U-Net).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct GroupNorm {
     width: usize,

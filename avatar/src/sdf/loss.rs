@@ -60,7 +60,7 @@ pub struct LossConfig {
 }
 
 impl LossConfig {
-    /// MetaAvatar's weights (seed-systems 1.7).
+    /// MetaAvatar's weights.
     pub fn paper() -> Self {
         Self { distance: 0.0, free: 0.0, ..Self::default() }
     }

@@ -1,7 +1,7 @@
 //! Skinning both ways: which bones move a point, and the map between star pose and posed space.
 //!
 //! Inverse skinning asks for the weights of points on a posed body, forward skinning for those of points
-//! in canonical space. Either way the map is two blends and a product (seed-systems.md 1.6):
+//! in canonical space. Either way the map is two blends and a product (docs/spaces.md):
 //! `x_posed = (sum w B) (sum w V)^-1 x_star + t`.
 
 mod closest_body_point;
@@ -52,7 +52,7 @@ pub trait Skinning: Send + Sync {
     }
 }
 
-/// Toes and fingers ride on ankles and wrists (seed-systems.md 1.9, step 7): depth cannot see them turn.
+/// Toes and fingers ride on ankles and wrists, as in MetaAvatar: depth cannot see them turn.
 const CARRIED_BONES: [(usize, usize); 4] = [(10, 7), (11, 8), (22, 20), (23, 21)];
 
 /// Gives the weights of toes and fingers to the bones that carry them.

@@ -16,7 +16,7 @@ pub(crate) mod topic {
     pub(crate) const EVENT: &str = "/effigy/event";
 }
 
-/// Foxglove's "frame ids": the spaces of design.md.
+/// Foxglove's "frame ids": the spaces of docs/spaces.md.
 pub(crate) mod space {
     pub(crate) const WORLD: &str = "world";
     pub(crate) const DEPTH_CAMERA: &str = "depth_camera";

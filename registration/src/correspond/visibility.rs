@@ -14,15 +14,11 @@ pub(crate) struct Visibility {
     visible: Vec<bool>,
 }
 
-/// How a drawn body compares with the picture; the shares are of the union of body and person.
+/// How a drawn body compares with the picture, over the union of body and person.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Agreement {
     /// Mean over the union of the depth difference, cut at [`WORST_M`]; a cell that only one of them has counts as that.
     pub(crate) error_m: f32,
-    /// Intersection over union of the silhouettes.
-    pub(crate) overlap: f32,
-    /// Cells where both are, and their depths differ by less than [`CLOSE_M`], as a share of the person's.
-    pub(crate) explained: f32,
 }
 
 /// Draws bodies into one view.
@@ -34,7 +30,6 @@ pub(crate) struct Renderer {
 
 /// Worse than this is simply wrong.
 const WORST_M: f32 = 0.10;
-const CLOSE_M: f32 = 0.06;
 /// Whatever is measured less than this behind the body hides it, or is the very limb, cut off the mask by mistake.
 const BEHIND_M: f32 = 0.10;
 /// Vertices this far behind the drawn surface are hidden by it; coarse triangles cut corners by less.
@@ -128,45 +123,24 @@ fn faces(vertex: Vec3, normal: Vec3, camera_in_world: Vec3) -> bool {
 
 #[derive(Default)]
 struct Tally {
-    person: u32,
-    both: u32,
     union: u32,
-    close: u32,
     error_m: f64,
 }
 
 impl Tally {
     fn add(&mut self, seen: Seen, depth_m: f32, drawn_m: f32) {
-        let drawn = drawn_m > 0.0;
+        let (is_person, drawn) = (seen == Seen::Person, drawn_m > 0.0);
         let hidden = seen == Seen::Gap || (seen == Seen::Other && depth_m < drawn_m + BEHIND_M);
-        match (seen == Seen::Person, drawn) {
-            (true, true) => {
-                let difference_m = (depth_m - drawn_m).abs();
-                self.person += 1;
-                self.both += 1;
-                self.union += 1;
-                self.close += u32::from(difference_m < CLOSE_M);
-                self.error_m += f64::from(difference_m.min(WORST_M));
-            }
-            (true, false) => {
-                self.person += 1;
-                self.union += 1;
-                self.error_m += f64::from(WORST_M);
-            }
-            (false, true) if !hidden => {
-                self.union += 1;
-                self.error_m += f64::from(WORST_M);
-            }
-            (false, _) => {}
+        if is_person && drawn {
+            self.union += 1;
+            self.error_m += f64::from((depth_m - drawn_m).abs().min(WORST_M));
+        } else if is_person || (drawn && !hidden) {
+            self.union += 1;
+            self.error_m += f64::from(WORST_M);
         }
     }
 
     fn agreement(&self) -> Agreement {
-        let union = self.union.max(1) as f32;
-        Agreement {
-            error_m: (self.error_m / f64::from(self.union.max(1))) as f32,
-            overlap: self.both as f32 / union,
-            explained: self.close as f32 / self.person.max(1) as f32,
-        }
+        Agreement { error_m: (self.error_m / f64::from(self.union.max(1))) as f32 }
     }
 }

@@ -17,7 +17,7 @@ pub struct UnitBox {
 }
 
 impl UnitBox {
-    /// The box of a minimal body in star pose; seed-systems.md 1.6. `None` for an empty body.
+    /// The box of a minimal body in star pose, as MetaAvatar's code pads and scales it (docs/spaces.md). `None` for an empty body.
     pub fn from_canonical_body(vertices: &[Vec3]) -> Option<Self> {
         if vertices.is_empty() {
             return None;

@@ -96,7 +96,7 @@ impl Tracker {
         self.shape.is_frozen(&self.config.fit)
     }
 
-    /// Starts anew with another person; what is known of the floor stays.
+    /// Starts anew with another person, their shape and clothes unknown; what is known of the floor stays.
     pub fn forget_person(&mut self) {
         self.worn = None;
         self.clothes = self.config.energy;

@@ -18,7 +18,8 @@ const KNOWN_TO_M: f32 = 0.010;
 
 impl Tracker {
     /// From now on aligns to a surface instead of the bare body: for each of the model's vertices how far the
-    /// surface is from it, in canonical (star-pose) space. Betas, joints and parameters stay the bare body's.
+    /// surface is from it, in canonical (star-pose) space. Betas, joints and parameters stay the bare body's. Until
+    /// [`Tracker::forget_person`].
     pub fn set_surface(&mut self, offsets_in_canonical: &[Vec3]) -> Result<(), RegistrationError> {
         let model = &self.surface.model;
         let offsets = offsets_in_zero_pose(model, &self.shaped.betas, offsets_in_canonical)?;
@@ -26,13 +27,6 @@ impl Tracker {
         self.energy = self.config.energy.with_known_surface();
         self.shaped = self.dressed(&self.surface, self.shaped.betas);
         Ok(())
-    }
-
-    /// Aligns to the bare body again, allowing for clothes.
-    pub fn forget_surface(&mut self) {
-        self.worn = None;
-        self.energy = self.clothes;
-        self.shaped = self.dressed(&self.surface, self.shaped.betas);
     }
 
     /// A surface of the person with what is known of their clothes.
@@ -125,7 +119,7 @@ mod tests {
             // A turn about z, as the star pose's legs make, leaves z alone; blends shorten it a little.
             assert!((worn.z - bare.z - 0.02).abs() < 1e-4);
         }
-        tracker.forget_surface();
+        tracker.forget_person();
         assert_eq!(tracker.shaped.vertices, bare.vertices);
     }
 }

@@ -60,6 +60,23 @@ pub struct SequenceEntry {
 }
 
 impl Manifest {
+    /// What each person of a split does in each of their outfits, in the order of the sequences.
+    pub fn wearers(&self, split: Split) -> Vec<Vec<&SequenceEntry>> {
+        let mut wearers: Vec<Vec<&SequenceEntry>> = Vec::new();
+        for entry in self
+            .sequences
+            .iter()
+            .filter(|entry| entry.plan.split == split)
+        {
+            let who = |entry: &SequenceEntry| (entry.plan.subject, entry.plan.outfit);
+            match wearers.iter_mut().find(|known| who(known[0]) == who(entry)) {
+                Some(known) => known.push(entry),
+                None => wearers.push(vec![entry]),
+            }
+        }
+        wearers
+    }
+
     /// The least mean error (`D_f`) over two visits to the same poses that a function of the pose can have on this person
     /// in this outfit: the mean over their sequences. `None` where it was not measured or nothing is simulated.
     pub fn history_floor_cm(&self, split: Split, subject: u32, outfit: OutfitName) -> Option<f32> {

@@ -17,8 +17,6 @@ use glam::{Quat, Vec3};
 use rand::{Rng as _, RngExt as _, SeedableRng as _, rngs::StdRng};
 use rand_distr::{Distribution as _, StandardNormal};
 
-use super::people::by_person;
-
 /// Of so many training people, one is held out, in all they do.
 const HELD_OUT_EVERY: usize = 10;
 
@@ -40,8 +38,7 @@ struct Place {
 impl Clouds {
     /// Reads the training people, never the test people.
     pub(crate) fn load(dataset: &Dataset, points: usize, seed: u64) -> anyhow::Result<Self> {
-        let entries = dataset.manifest().sequences.iter();
-        let people = by_person(entries.filter(|entry| entry.plan.split == Split::Train));
+        let people = dataset.manifest().wearers(Split::Train);
         if people.len() < HELD_OUT_EVERY {
             bail!(
                 "{} training people in this data set, expected {HELD_OUT_EVERY} or more; make one with `effigy dataset make --preset prior`",

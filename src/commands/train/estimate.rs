@@ -29,7 +29,8 @@ pub(super) fn say_hyper(config: &PriorConfig) {
 /// `frames`: how often a frame's points go through the field, forwards and backwards.
 fn say(config: &PriorConfig, frames: f64) {
     let field = config.network.field;
-    // Six products of the forward pass's size (seed-systems 1.2), two operations a multiply-add.
+    // Value, gradient by a reverse sweep, and the backward pass through both: six products of the forward pass's size, two
+    // operations a multiply-add.
     let per_frame =
         12.0 * field.parameter_count() as f64 * config.sampling.points_per_frame() as f64;
     let start = Clock::start();

@@ -21,7 +21,7 @@ use effigy_sim_sensor::dataset::{Dataset, Split};
 
 use self::{
     held_out::{Judge, is_held_out},
-    people::{ClothPeople, OffsetPeople, People, by_person},
+    people::{ClothPeople, OffsetPeople, People},
     report::Reporter,
 };
 use crate::{
@@ -115,6 +115,9 @@ impl<'a> Job<'a> {
         );
         let mut config = config(args)?;
         config.seed = args.seed;
+        if config.joint.people == 0 {
+            config.joint.people = people.count();
+        }
         Ok(Self { args, body, config, people, judges })
     }
 
@@ -186,8 +189,7 @@ fn people(
     };
     let dataset = Dataset::open(path, body)?;
     let settings = Settings::default();
-    let all = dataset.manifest().sequences.iter();
-    let training = by_person(all.filter(|entry| entry.plan.split == Split::Train));
+    let training = dataset.manifest().wearers(Split::Train);
     let (mut teachers, mut judges) = (Vec::new(), Vec::new());
     for (index, entries) in training.into_iter().enumerate() {
         if is_held_out(index) {
@@ -230,7 +232,6 @@ fn check(config: &PriorConfig) -> anyhow::Result<()> {
     let PriorConfig { reptile, joint, adapt, .. } = config;
     let counts = [
         ("reptile.people", reptile.people),
-        ("joint.people", joint.people),
         ("joint.frames", joint.frames),
         ("joint.people_per_step", joint.people_per_step),
         ("joint.frames_per_person", joint.frames_per_person),

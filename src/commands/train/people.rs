@@ -62,21 +62,6 @@ impl ClothPeople {
     }
 }
 
-/// The sequences of each person in an outfit, in the data set's order.
-pub(super) fn by_person<'a>(
-    entries: impl Iterator<Item = &'a SequenceEntry>,
-) -> Vec<Vec<&'a SequenceEntry>> {
-    let mut people: Vec<Vec<&SequenceEntry>> = Vec::new();
-    for entry in entries {
-        let who = |entry: &SequenceEntry| (entry.plan.subject, entry.plan.outfit);
-        match people.iter_mut().find(|known| who(known[0]) == who(entry)) {
-            Some(known) => known.push(entry),
-            None => people.push(vec![entry]),
-        }
-    }
-    people
-}
-
 fn learned(
     dataset: &Dataset,
     entries: &[&SequenceEntry],
@@ -193,6 +178,20 @@ pub(super) struct People {
     pub(super) one_in: u64,
     /// In words.
     pub(super) described: String,
+}
+
+impl People {
+    /// So many that everybody in cloth is among them; of those in simpler clothes there is no end.
+    pub(super) fn count(&self) -> usize {
+        const SIMPLER: usize = 200;
+        let in_cloth = self.cloth.as_ref().map_or(0, ClothPeople::count);
+        let one_in = self.one_in as usize;
+        match (in_cloth, one_in) {
+            (0, _) | (_, 1) => SIMPLER,
+            (_, 0) => in_cloth,
+            _ => (in_cloth * one_in).div_ceil(one_in - 1),
+        }
+    }
 }
 
 impl PersonSource for People {

@@ -114,7 +114,7 @@ pub struct TrainingView {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PerformanceView {
     pub frames_per_sec: f32,
-    /// From exposure to the picture's data.
+    /// From a frame's delivery to the picture's data.
     pub latency_p50_ms: f32,
     pub latency_p95_ms: f32,
     /// In the order a frame meets them.

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use crate::nn::unet::UNetConfig;
 
 /// A point encoder with plane pooling, a U-Net that the three planes share, and a decoder for each point
-/// (seed-systems.md 1.5).
+/// (Peng et al. 2020).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct NetworkConfig {

@@ -160,7 +160,7 @@ struct Row {
     closest: SkinnedPoint,
 }
 
-/// The middle of the points' box, and 1.5 over its largest side (seed-systems.md 1.5).
+/// The middle of the points' box, and 1.5 over its largest side (as MetaAvatar normalises clouds).
 pub(super) fn normalisation(points: impl Iterator<Item = Vec3>) -> (Vec3, f32) {
     const LEAST_SIZE_M: f32 = 1.6;
     let start = (Vec3::INFINITY, Vec3::NEG_INFINITY);

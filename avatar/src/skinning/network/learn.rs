@@ -17,7 +17,7 @@ use super::{
 };
 use crate::skinning::{BoneWeights, ClosestBodyPoint, SkinnedPoint, fold_extremities};
 
-/// Deviation of a head's or camera's tilt, and the most of it (seed-systems.md 1.9, step 4).
+/// Deviation of a head's or camera's tilt, and the most of it in MetaAvatar's augmentation.
 const TILT_RAD: f32 = 0.17;
 const MOST_TILT_RAD: f32 = 0.35;
 

@@ -1,6 +1,6 @@
 //! Skinning networks: from a cloud (and the tracked body beside it) to bone weights.
 //!
-//! Three of one kind (seed-systems.md 1.5): the inverse one looks at posed clouds, the forward one at canonical
+//! Three of one kind (convolutional occupancy networks, Peng et al. 2020, which MetaAvatar uses): the inverse one looks at posed clouds, the forward one at canonical
 //! clouds, and both add to what the closest body points say; the third sees nothing but a raw cloud and names the
 //! body part of each point.
 

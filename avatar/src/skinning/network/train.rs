@@ -32,7 +32,7 @@ pub struct SkinningTrainConfig {
     pub steps: u32,
     /// Clouds of one step.
     pub clouds: usize,
-    /// Points of a cloud, for the estimate of time; the source decides.
+    /// Points of a cloud.
     pub points: usize,
     pub rate: f32,
     /// Steps over which the rate rises to its full value.
@@ -68,7 +68,7 @@ impl Default for SkinningTrainConfig {
     }
 }
 
-/// Two kinds of cloud (seed-systems.md 1.1, stage 0).
+/// Two kinds of cloud, as MetaAvatar's skinning networks are trained with both.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CloudKind {
     /// What one camera sees.

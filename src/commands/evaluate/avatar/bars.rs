@@ -27,7 +27,7 @@ impl Bar {
     }
 }
 
-/// Outfits that fit closely; what is neither these nor a blazer with its open front counts as loose.
+/// Outfits that fit closely; all others count as loose.
 const CLOSE_FITTING: [&str; 4] = [
     "longsleeve_trousers",
     "tshirt_shorts",

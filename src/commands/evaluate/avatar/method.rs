@@ -41,7 +41,7 @@ const FRAMES_PER_STEP: usize = 8;
 /// More frames are seen as often each as eight are, but no more steps are taken than this many times the live chain's.
 const MOST_STEPS_FACTOR: u32 = 10;
 
-/// Other people's ways take this many times our steps, each over half the keyframes; not timed yet.
+/// Other people's ways take this many times our steps, each over half the keyframes.
 const BASELINE_STEPS_FACTOR: u32 = 10;
 const BASELINE_FRAMES_PER_STEP: usize = 4;
 /// Adam's rates of networks that start from nothing, and of those that know people.

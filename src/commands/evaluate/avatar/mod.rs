@@ -188,8 +188,17 @@ impl Evaluation<'_> {
 
     /// Characters of other makers through the whole chain.
     fn strangers(&mut self) -> anyhow::Result<()> {
+        let methods = &self.args.methods;
+        // They have these two rows and no others.
+        let asked = [Method::BareBody, Method::Effigy];
+        if !methods.is_empty() && !asked.iter().any(|method| methods.contains(method)) {
+            return Ok(());
+        }
         for path in strangers::files(self.args.quick) {
             let name = strangers::name(&path);
+            if !self.args.wants(&name) {
+                continue;
+            }
             let is_done = |row: &Row| row.table == Table::Strangers && row.subject == name;
             if self.rows.iter().any(is_done) {
                 continue;

@@ -4,8 +4,8 @@ use anyhow::ensure;
 use effigy_avatar::hyper::Provenance;
 use effigy_sim_sensor::dataset::{DatasetPlan, DatasetPreset, Manifest, Role, SequencePlan, Split};
 
-/// Refuses a data set whose test people or extrapolated actions were learned from, by its own training split or by the
-/// shipped prior.
+/// Refuses a data set whose test people were learned from, by its own training split or by the prior, or do in extrapolation
+/// what their avatar learned from.
 pub(super) fn check(manifest: &Manifest, prior: &Provenance) -> anyhow::Result<()> {
     let plans: Vec<&SequencePlan> = manifest.sequences.iter().map(|entry| &entry.plan).collect();
     let learned = learned_from(&prior.training);
@@ -34,7 +34,7 @@ fn learned_from(training: &str) -> Vec<SequencePlan> {
     plans.filter(|plan| plan.split == Split::Train).collect()
 }
 
-/// No test person is a training person, and no action of extrapolation was learned from that person or in `learned`.
+/// No test person is a training person, here or in `learned`, and no action of extrapolation was learned from that person.
 fn check_plans(plans: &[&SequencePlan], learned: &[&SequencePlan]) -> anyhow::Result<()> {
     for test in plans.iter().filter(|plan| plan.split == Split::Test) {
         let trained = plans.iter().filter(|plan| plan.split == Split::Train);

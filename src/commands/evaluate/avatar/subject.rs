@@ -27,7 +27,7 @@ pub(super) enum Task {
 pub(super) struct Subject {
     pub(super) name: String,
     pub(super) outfit: String,
-    /// What the data set knows of it; nothing yet.
+    /// What the data set knows of it.
     pub(super) history_floor_cm: Option<f64>,
     sequences: Vec<Sequence>,
     /// Sequence and frame of what may be learned from: all frames but those that are judged.
@@ -65,7 +65,10 @@ const IN_THE_TABLES: [OutfitKind; 4] = [
 
 /// Test people in outfits: the four of the tables, or all of them.
 pub(super) fn chosen(dataset: &Dataset, all: bool) -> Vec<Entries> {
-    let mut people = test_people(dataset);
+    let wearers = dataset.manifest().wearers(Split::Test).into_iter();
+    let mut people: Vec<Entries> = wearers
+        .map(|entries| entries.into_iter().cloned().collect())
+        .collect();
     if all {
         return people;
     }
@@ -89,23 +92,6 @@ pub(super) fn chosen(dataset: &Dataset, all: bool) -> Vec<Entries> {
 pub(super) fn name(entries: &[SequenceEntry]) -> String {
     let plan = &entries[0].plan;
     format!("{:03}-{}", plan.subject, plan.outfit.name())
-}
-
-/// The sequences of each test person in each outfit.
-fn test_people(dataset: &Dataset) -> Vec<Entries> {
-    let mut people: Vec<Entries> = Vec::new();
-    let tests = dataset.manifest().sequences.iter();
-    for entry in tests.filter(|entry| entry.plan.split == Split::Test) {
-        let same = |people: &&mut Entries| {
-            let plan = &people[0].plan;
-            (plan.subject, plan.outfit) == (entry.plan.subject, entry.plan.outfit)
-        };
-        match people.iter_mut().find(same) {
-            Some(person) => person.push(entry.clone()),
-            None => people.push(vec![entry.clone()]),
-        }
-    }
-    people
 }
 
 impl Subject {

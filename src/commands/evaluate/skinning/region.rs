@@ -1,10 +1,8 @@
 //! Where two parts of the body touch in a pose though they are far apart on the body: there skinning is hard.
 
+use effigy_avatar::skinning::star_body;
 use effigy_fusion::{TriangleMesh, mesh::closest_point::ClosestPoint};
-use effigy_registration::{
-    BodyModel, PosedBody,
-    smpl::{JOINT_COUNT, VertexWeights, star_transforms},
-};
+use effigy_registration::{BodyModel, PosedBody, smpl::JOINT_COUNT};
 use glam::Vec3;
 
 /// Another part is this near in the pose...
@@ -124,17 +122,6 @@ impl Contacts {
         }
         region
     }
-}
-
-/// The minimal body in star pose.
-fn star_body(model: &BodyModel, betas: &[f32; 10]) -> Vec<Vec3> {
-    let mut vertices = model.shaped_vertices(betas);
-    let star = star_transforms(&model.joints(&vertices));
-    let skinned = vertices.iter_mut().zip(&model.skinning);
-    skinned.for_each(|(vertex, weights): (&mut Vec3, &VertexWeights)| {
-        *vertex = star.blend(weights).transform_point3(*vertex);
-    });
-    vertices
 }
 
 #[cfg(test)]

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use effigy_registration::motion::Routine;
 use effigy_sim_sensor::{MotionChoice, OutfitKind, Scenario, SensorPreset, StrangerChoice};
 
-/// The people of the test split: nothing was ever tuned on them. Settings are tuned on people below 100.
+/// The people of the test split: nothing was ever tuned on them. Settings are tuned on 104 to 106.
 const TEST_PEOPLE: [u64; 3] = [101, 102, 103];
 
 /// Strangers are watched for as long as this.

@@ -53,7 +53,7 @@ struct Row {
     /// Of the frames in which there was no body, or none where it was said to be.
     false_tracked_fraction: Option<f64>,
     jitter_mm: Option<f64>,
-    /// The same two figures after smoothing as it is by default.
+    /// The same two figures after smoothing as the settings say.
     jitter_smooth_mm: Option<f64>,
     mpjpe_smooth_mm: Option<f64>,
     height_error_mm: Option<f64>,
