@@ -16,14 +16,6 @@ pub(crate) struct MatchConfig {
 }
 
 impl MatchConfig {
-    /// What applies to a point whose normal is worth less than others'.
-    fn for_trust(self, normal_trust: f32) -> Self {
-        /// A worthless normal may look this far away.
-        const FARTHEST: f32 = -0.5;
-        let oblique = FARTHEST + (self.oblique - FARTHEST) * normal_trust;
-        Self { direction_m: self.direction_m * normal_trust.sqrt(), oblique, ..self }
-    }
-
     /// What is minimised: the squared distance, and the squared chord between the normals.
     #[inline]
     pub(super) fn measure(&self, offset: Vec3, facing: f32) -> f32 {
@@ -56,7 +48,6 @@ impl Matcher {
         let visible = (0..body.vertices.len() as u32).filter(|&v| visibility.is_visible(v));
         let grid = OrientedGrid::new(&body.vertices, &body.normals, visible, CELL_M);
         for (point, last) in points.iter().zip(&mut self.last) {
-            let config = config.for_trust(point.normal_trust);
             let guess = guess(*last, point, body, visibility, config);
             let found = grid.nearest(point.position, point.normal, guess, config);
             *last = found.map_or(u32::MAX, |found| found.0);
@@ -93,7 +84,7 @@ fn matched(
     Some(Match {
         vertex,
         point: point.position,
-        normal: (point.normal * point.normal_trust + body_normal).try_normalize()?,
+        normal: (point.normal + body_normal).try_normalize()?,
         sigma_m: point.sigma_m,
         trust: ((facing - config.oblique) / (1.0 - config.oblique)).min(1.0),
     })

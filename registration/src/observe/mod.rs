@@ -4,7 +4,7 @@ mod distance;
 mod sample;
 mod view;
 
-pub(crate) use sample::{DataPoint, SampleConfig, sample};
+pub(crate) use sample::{DataPoint, sample};
 pub(crate) use view::{Seen, View};
 
 use effigy_capture::{CameraModel, Rigid3};
@@ -15,8 +15,6 @@ use glam::Vec3;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct ObserveConfig {
     pub(crate) points: usize,
-    pub(crate) rim_px: usize,
-    pub(crate) normal_error_rad: f32,
     pub(crate) cell_m: f32,
     /// Fewer person pixels than this are nobody.
     pub(crate) min_px: usize,
@@ -50,13 +48,7 @@ impl Observation {
         if person_px < config.min_px.max(1) {
             return None;
         }
-        let sampling = SampleConfig {
-            points: config.points,
-            rim_px: config.rim_px,
-            pixel_pitch: 2.0 / (camera.intrinsics.fx + camera.intrinsics.fy),
-            normal_error_rad: config.normal_error_rad,
-        };
-        let points = sample(clean, world_from_camera, person_px, &sampling);
+        let points = sample(clean, world_from_camera, person_px, config.points);
         let extent = Extent::of(&points)?;
         let mut view = View::new(clean, camera, world_from_camera, config.cell_m)?;
         view.noise_m = noise_m(&points);

@@ -17,10 +17,6 @@ pub struct TrackConfig {
     /// Depth points a frame.
     pub points: usize,
     pub search_points: usize,
-    /// Depth points this near to an edge of the person are left out.
-    pub rim_px: usize,
-    /// Error of a measured normal for noise as wide as a pixel.
-    pub normal_error_rad: f32,
     /// How much of a frame's velocity is believed; the rest is as it was.
     pub velocity_share: f32,
     /// Rounds of matching and moving a frame.
@@ -51,13 +47,7 @@ pub struct TrackConfig {
 impl TrackConfig {
     /// How frames are looked at to follow a body in them.
     pub(super) fn looks(&self) -> ObserveConfig {
-        ObserveConfig {
-            points: self.points,
-            rim_px: self.rim_px,
-            normal_error_rad: self.normal_error_rad,
-            cell_m: 0.01,
-            min_px: self.min_person_px,
-        }
+        ObserveConfig { points: self.points, cell_m: 0.01, min_px: self.min_person_px }
     }
 }
 
@@ -68,8 +58,6 @@ impl Default for TrackConfig {
             search_vertices: 600,
             points: 1600,
             search_points: 260,
-            rim_px: 0,
-            normal_error_rad: 0.0,
             velocity_share: 0.4,
             rounds: 7,
             steps: 1,
