@@ -2,7 +2,6 @@
 
 use std::{
     collections::BTreeMap,
-    fmt::{self, Display},
     path::{Path, PathBuf},
 };
 
@@ -66,43 +65,4 @@ pub fn info(path: &Path) -> Result<Info, CaptureError> {
         events,
         damage,
     })
-}
-
-impl Display for Info {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(f, "{}", self.path.display())?;
-        let [width, height] = self.depth_px;
-        write!(
-            f,
-            "  sensor    {}, depth {width}x{height}",
-            self.sensor_name
-        )?;
-        match self.color_px {
-            Some([width, height]) => writeln!(f, ", colour {width}x{height}")?,
-            None => writeln!(f, ", no colour")?,
-        }
-        writeln!(
-            f,
-            "  frames    {} in {:.2} s ({:.1} Hz), {:.1} MB",
-            self.frames,
-            self.duration_secs,
-            self.rate_hz,
-            self.file_bytes as f64 * 1e-6
-        )?;
-        for (key, value) in &self.metadata {
-            let short: String = value.chars().take(100).collect();
-            writeln!(
-                f,
-                "  metadata  {key} = {short}{}",
-                if short.len() < value.len() { "..." } else { "" }
-            )?;
-        }
-        for (name, count) in &self.events {
-            writeln!(f, "  events    {name}: {count}")?;
-        }
-        match &self.damage {
-            Some(damage) => write!(f, "  damage    {damage}"),
-            None => write!(f, "  damage    none"),
-        }
-    }
 }

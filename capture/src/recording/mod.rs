@@ -19,8 +19,8 @@ mod writer;
 
 pub use damage::Damage;
 pub use info::{Info, info};
-pub use player::{PlayState, Played, Player, Repeat};
-pub use reader::{ColorUse, Event, Recording};
+pub use player::{Player, Repeat};
+pub use reader::{Event, Recording};
 pub use writer::{DropCounts, Pushed, RecordConfig, RecordingSummary, RecordingWriter};
 
 pub use crate::codec::color::ColorCodec;

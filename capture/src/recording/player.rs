@@ -1,22 +1,9 @@
-//! Playing a recording: forwards, again and again, one frame at a time, from anywhere.
+//! Playing a recording: forwards, again and again, from anywhere.
 
 use std::path::Path;
 
 use super::reader::Recording;
-use crate::{
-    calibration::Calibration,
-    error::CaptureError,
-    frame::Frame,
-    source::FrameSource,
-    time::{FrameId, Timestamp},
-};
-
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum PlayState {
-    #[default]
-    Playing,
-    Paused,
-}
+use crate::{calibration::Calibration, error::CaptureError, frame::Frame, source::FrameSource};
 
 /// What comes after the last frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -27,21 +14,10 @@ pub enum Repeat {
     Loop,
 }
 
-/// What a player has to show.
-#[derive(Clone, Debug)]
-pub enum Played {
-    Frame(Frame),
-    /// Paused, and no step is due.
-    Paused,
-    Ended,
-}
-
 /// A recording with a position. Frames that cannot be read are skipped and counted.
 pub struct Player {
     recording: Recording,
     next: usize,
-    state: PlayState,
-    steps: u32,
     repeat: Repeat,
     skipped: u64,
     warned_at: Option<u64>,
@@ -53,60 +29,16 @@ impl Player {
     }
 
     pub fn new(recording: Recording) -> Self {
-        Self {
-            recording,
-            next: 0,
-            state: PlayState::Playing,
-            steps: 0,
-            repeat: Repeat::Once,
-            skipped: 0,
-            warned_at: None,
-        }
-    }
-
-    pub fn repeating(self, repeat: Repeat) -> Self {
-        Self { repeat, ..self }
+        Self { recording, next: 0, repeat: Repeat::Once, skipped: 0, warned_at: None }
     }
 
     pub fn recording(&self) -> &Recording {
         &self.recording
     }
 
-    pub fn state(&self) -> PlayState {
-        self.state
-    }
-
-    pub fn pause(&mut self) {
-        self.state = PlayState::Paused;
-    }
-
-    pub fn resume(&mut self) {
-        self.state = PlayState::Playing;
-        self.steps = 0;
-    }
-
-    /// While paused: one frame more.
-    pub fn step(&mut self) {
-        if self.state == PlayState::Paused {
-            self.steps += 1;
-        }
-    }
-
     /// Continues with the frame that has an index; past the last one is the end.
     pub fn seek(&mut self, index: usize) {
         self.next = index.min(self.recording.frame_count());
-    }
-
-    /// Continues with the first frame at or after a time.
-    pub fn seek_time(&mut self, time: Timestamp) {
-        self.next = self.recording.index_at(time);
-    }
-
-    /// Continues with the frame that has an id; `false`, and nothing changes, if there is none.
-    pub fn seek_id(&mut self, id: FrameId) -> bool {
-        let index = self.recording.index_of(id);
-        self.next = index.unwrap_or(self.next);
-        index.is_some()
     }
 
     /// What comes after the last frame from now on.
@@ -124,20 +56,7 @@ impl Player {
         self.skipped
     }
 
-    /// The next frame, if playing or a step is due.
-    pub fn poll(&mut self) -> Result<Played, CaptureError> {
-        if self.state == PlayState::Paused && self.steps == 0 {
-            return Ok(Played::Paused);
-        }
-        let played = match self.advance()? {
-            Some(frame) => Played::Frame(frame),
-            None => Played::Ended,
-        };
-        self.steps = self.steps.saturating_sub(1);
-        Ok(played)
-    }
-
-    /// The next readable frame, whether paused or not. A whole round without one is the end.
+    /// The next readable frame. A whole round without one is the end.
     fn advance(&mut self) -> Result<Option<Frame>, CaptureError> {
         for _ in 0..=self.recording.frame_count() {
             if self.next >= self.recording.frame_count() {
@@ -183,7 +102,6 @@ impl FrameSource for Player {
         self.recording.calibration()
     }
 
-    /// While paused each call is a step: use [`Player::poll`] where somebody may pause.
     fn next_frame(&mut self) -> Result<Option<Frame>, CaptureError> {
         self.advance()
     }

@@ -37,15 +37,6 @@ pub struct Event {
     pub value: serde_json::Value,
 }
 
-/// Whether colour, which takes ten times as long as depth to decode, is wanted.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum ColorUse {
-    #[default]
-    Decode,
-    /// Frames come without colour.
-    Skip,
-}
-
 /// An open recording. Holds an index and one chunk at a time; images are decoded when asked for.
 pub struct Recording {
     path: PathBuf,
@@ -57,7 +48,6 @@ pub struct Recording {
     events: Vec<Event>,
     damage: Option<Damage>,
     loaded: Option<(u32, Vec<u8>)>,
-    color_use: ColorUse,
 }
 
 impl Recording {
@@ -95,12 +85,7 @@ impl Recording {
             events,
             damage,
             loaded: None,
-            color_use: ColorUse::Decode,
         })
-    }
-
-    pub fn with_color(self, color_use: ColorUse) -> Self {
-        Self { color_use, ..self }
     }
 
     pub fn path(&self) -> &Path {
@@ -153,19 +138,6 @@ impl Recording {
             .map(|entry| (entry.id, entry.timestamp))
     }
 
-    /// Where the frame with an id is.
-    pub fn index_of(&self, id: FrameId) -> Option<usize> {
-        self.frames.iter().position(|entry| entry.id == id)
-    }
-
-    /// The first frame at or after a time; the number of frames if there is none.
-    pub fn index_at(&self, time: Timestamp) -> usize {
-        self.frames
-            .iter()
-            .position(|entry| entry.timestamp >= time)
-            .unwrap_or(self.frames.len())
-    }
-
     /// Reads and decodes one frame.
     pub fn frame(&mut self, index: usize) -> Result<Frame, CaptureError> {
         let Some(&entry) = self.frames.get(index) else {
@@ -191,7 +163,7 @@ impl Recording {
             let reason = format!("it is {got_px:?}, the calibration expects {expected_px:?}");
             return Err(bad(&self.path, "the depth image", reason));
         }
-        let color = match entry.color.filter(|_| self.color_use == ColorUse::Decode) {
+        let color = match entry.color {
             Some(place) => {
                 let image = self.image(place, entry, "the colour image")?;
                 let color = color::decode(&image.data);
