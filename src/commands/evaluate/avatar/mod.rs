@@ -17,8 +17,10 @@ mod views;
 use std::path::Path;
 
 use anyhow::bail;
+use effigy_avatar::hyper::{HyperNetwork, Precision};
 use effigy_registration::smpl::builtin;
 use effigy_sim_sensor::dataset::{Dataset, Split};
+use sha2::{Digest as _, Sha256};
 
 pub(super) use self::views::{protocol_calibration, protocol_frame};
 use self::{
@@ -52,8 +54,8 @@ pub(super) fn run(args: &EvaluateAvatarArgs, data: &Path) -> anyhow::Result<()> 
     let body = builtin::body();
     let dataset = Dataset::open(data, &body)?;
     let settings = Settings::load(args.config.as_deref())?;
-    let prior = settings.prior_network(body.identity)?.provenance;
-    split::check(dataset.manifest(), &prior)?;
+    let prior = settings.prior_network(body.identity)?;
+    split::check(dataset.manifest(), &prior.provenance)?;
     let mut people = chosen(&dataset, args.all);
     let names: Vec<String> = people
         .iter()
@@ -80,7 +82,8 @@ pub(super) fn run(args: &EvaluateAvatarArgs, data: &Path) -> anyhow::Result<()> 
         test_frames,
         dataset: format!("{:?}", dataset.manifest().preset),
         dataset_seed: dataset.manifest().seed,
-        prior: prior.training,
+        inputs: hash_of_inputs(&settings, &dataset, &prior)?,
+        prior: prior.provenance.training,
     };
     let found = args.json.as_deref().filter(|_| args.resume);
     let mut evaluation = Evaluation {
@@ -100,6 +103,19 @@ pub(super) fn run(args: &EvaluateAvatarArgs, data: &Path) -> anyhow::Result<()> 
         evaluation.strangers()?;
     }
     evaluation.finish()
+}
+
+/// What else rows depend on, in one number.
+fn hash_of_inputs(
+    settings: &Settings,
+    dataset: &Dataset,
+    prior: &HyperNetwork,
+) -> anyhow::Result<String> {
+    let mut hash = Sha256::new();
+    hash.update(serde_json::to_vec(settings)?);
+    hash.update(serde_json::to_vec(dataset.manifest())?);
+    hash.update(prior.to_bytes(Precision::F32)?);
+    Ok(format!("{:x}", hash.finalize()))
 }
 
 /// Everything that an evaluation holds from its first row to its last.

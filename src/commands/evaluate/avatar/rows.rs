@@ -65,8 +65,10 @@ pub(crate) struct Circumstances {
     pub(crate) test_frames: usize,
     pub(crate) dataset: String,
     pub(crate) dataset_seed: u64,
-    /// How the shipped prior was trained, in its own words.
+    /// How the prior was trained, in its own words.
     pub(crate) prior: String,
+    /// SHA-256 of all settings, of the data set's list of files with their checksums, and of the prior.
+    pub(crate) inputs: String,
 }
 
 #[derive(Serialize)]
@@ -120,7 +122,7 @@ pub(crate) fn earlier(path: &Path, now: &Circumstances) -> anyhow::Result<Vec<Ro
     })?;
     ensure!(
         report.schema == SCHEMA && report.circumstances == *now,
-        "{}: its rows are of another data set, prior, number of frames or version; name another file with --json, or \
+        "{}: its rows are of another data set, prior, settings, number of frames or version; name another file with --json, or \
          leave --resume out to write over it",
         name()
     );
