@@ -22,9 +22,11 @@ pub(crate) fn write(path: &Path, content: impl AsRef<[u8]>) -> anyhow::Result<()
     if is_special {
         return explained(fs::write(path, content), path);
     }
-    let mut part = path.as_os_str().to_owned();
+    // A link stays, what it leads to is replaced.
+    let target = fs::canonicalize(path).unwrap_or_else(|_missing| path.to_owned());
+    let mut part = target.clone().into_os_string();
     part.push(".part");
-    let written = fs::write(&part, content).and_then(|()| fs::rename(&part, path));
+    let written = fs::write(&part, content).and_then(|()| fs::rename(&part, &target));
     if written.is_err() {
         fs::remove_file(&part).ok();
     }
