@@ -159,8 +159,8 @@ fn parse_text(text: &str) -> Option<Found> {
 
 /// Depth units a metre: TUM's 5000, or RealSense's 0.001 metres a unit the other way around.
 fn units_per_metre_of(word: &str) -> Option<f32> {
-    let scale: f32 = word.parse().ok()?;
-    let units = if scale < 1.0 { 1.0 / scale } else { scale };
+    let scale: f64 = word.parse().ok()?;
+    let units = if scale < 1.0 { 1.0 / scale } else { scale } as f32;
     (scale > 0.0 && units.is_finite()).then_some(units)
 }
 
