@@ -69,6 +69,14 @@ impl HyperNetwork {
         serialize(views, Some(metadata)).map_err(AvatarError::WriteNetwork)
     }
 
+    /// All parameters in a fixed order, f32, little-endian: the same for the same network each time, which a file is not
+    /// (its metadata come in any order).
+    pub fn parameter_bytes(&self) -> Vec<u8> {
+        let tensors = self.tensors();
+        let values = tensors.iter().flat_map(|tensor| tensor.values);
+        values.flat_map(|x| x.to_le_bytes()).collect()
+    }
+
     /// Reads what [`Self::to_bytes`] wrote; refuses unknown formats, wrong shapes and numbers that are not
     /// finite.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, AvatarError> {

@@ -654,9 +654,12 @@ mod tests {
         let mut network = moved(SMALL, &mut rng);
         network.provenance.training = "a test".to_owned();
         let bytes = network.to_bytes(Precision::F32).unwrap();
-        assert_eq!(HyperNetwork::from_bytes(&bytes).unwrap(), network);
+        let back = HyperNetwork::from_bytes(&bytes).unwrap();
+        assert_eq!(back, network);
+        assert_eq!(back.parameter_bytes(), network.parameter_bytes());
         let short = HyperNetwork::from_bytes(&network.to_bytes(Precision::F16).unwrap()).unwrap();
         assert_eq!(short.meta, network.meta);
+        assert_ne!(short.parameter_bytes(), network.parameter_bytes());
         let pose = pose(&mut rng);
         let (exact, rounded) = (network.field(&pose), short.field(&pose));
         let largest = exact.parameters().iter().zip(rounded.parameters());

@@ -17,7 +17,7 @@ mod views;
 use std::path::Path;
 
 use anyhow::bail;
-use effigy_avatar::hyper::{HyperNetwork, Precision};
+use effigy_avatar::hyper::HyperNetwork;
 use effigy_registration::smpl::builtin;
 use effigy_sim_sensor::dataset::{Dataset, Split};
 use sha2::{Digest as _, Sha256};
@@ -114,7 +114,7 @@ fn hash_of_inputs(
     let mut hash = Sha256::new();
     hash.update(serde_json::to_vec(settings)?);
     hash.update(serde_json::to_vec(dataset.manifest())?);
-    hash.update(prior.to_bytes(Precision::F32)?);
+    hash.update(prior.parameter_bytes());
     Ok(format!("{:x}", hash.finalize()))
 }
 
