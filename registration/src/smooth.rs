@@ -14,6 +14,7 @@ use glam::{Quat, Vec3};
 use serde::{Deserialize, Serialize};
 
 use crate::{
+    observe::face_on_m,
     registered::RegisteredFrame,
     smpl::{BodyParams, JOINT_COUNT, PARENTS},
     state::axis_angle,
@@ -225,18 +226,13 @@ impl Body {
     }
 }
 
-/// Standard deviation of the person's depth where it is seen face on, hence among the smallest; `None` where nobody is.
+/// Standard deviation of the person's depth where it is seen face on; `None` where nobody is.
 fn depth_noise_m(clean: &CleanFrame) -> Option<f32> {
     /// Neighbours are alike.
     const EVERY: usize = 17;
     let person = clean.person.iter().zip(&clean.sigma_m).step_by(EVERY);
-    let sigmas = person.filter_map(|(&person, &sigma_m)| person.then_some(sigma_m));
-    let mut sigmas: Vec<f32> = sigmas.filter(|sigma_m| sigma_m.is_finite()).collect();
-    if sigmas.is_empty() {
-        return None;
-    }
-    let rank = sigmas.len() / 10;
-    Some(*sigmas.select_nth_unstable_by(rank, f32::total_cmp).1)
+    let sigmas_m = person.filter_map(|(&person, &sigma_m)| person.then_some(sigma_m));
+    face_on_m(sigmas_m.filter(|sigma_m| sigma_m.is_finite()))
 }
 
 /// The rotation vector from one rotation to another, in the parent's axes.

@@ -26,19 +26,12 @@ fn facts(path: &Path) -> anyhow::Result<Value> {
         .and_then(|ending| ending.to_str())
         .unwrap_or_default();
     match ending {
-        _ if source::is_recording(path) => recording_facts(path),
+        _ if source::is_recording(path) => Ok(serde_json::to_value(recording::info(path)?)?),
         "effigy" => avatar_facts(path),
         "npz" => body_facts(path),
         _ if path.exists() => source_facts(path),
         _ => bail!("{}: no such file or folder", path.display()),
     }
-}
-
-fn recording_facts(path: &Path) -> anyhow::Result<Value> {
-    let mut facts = serde_json::to_value(recording::info(path)?)?;
-    let recording = recording::Recording::open(path)?;
-    facts["calibration"] = serde_json::to_value(recording.calibration())?;
-    Ok(facts)
 }
 
 fn avatar_facts(path: &Path) -> anyhow::Result<Value> {

@@ -9,7 +9,7 @@ use anyhow::{Context as _, ensure};
 use effigy_avatar::{
     MapConfig,
     canonicalise::CanonicaliseConfig,
-    fine_tune::FineTuneConfig,
+    fine_tune::{FineTuneConfig, SamplingConfig},
     hyper::{self, HyperNetwork},
     keyframes::KeyframeConfig,
 };
@@ -156,11 +156,7 @@ impl Settings {
             doubt_m.is_finite() && doubt_m >= 0.0,
             "fine_tune.doubt_m is {doubt_m}, expected metres, or 0 for no doubts"
         );
-        let near_deviation = self.fine_tune.sampling.near_deviation;
-        ensure!(
-            near_deviation.is_finite() && near_deviation >= 0.0,
-            "fine_tune.sampling.near_deviation is {near_deviation}, expected a length of unit space, 0 or more"
-        );
+        check_sampling(&self.fine_tune.sampling).context("fine_tune")?;
         let min_samples = self.clean.segment.floor.min_samples;
         ensure!(
             min_samples >= 3,
@@ -186,4 +182,14 @@ impl Settings {
         }
         Ok(())
     }
+}
+
+/// Refuses what no point can be drawn by; of fine-tuning's settings and of a training's.
+pub(crate) fn check_sampling(sampling: &SamplingConfig) -> anyhow::Result<()> {
+    let near_deviation = sampling.near_deviation;
+    ensure!(
+        near_deviation.is_finite() && near_deviation >= 0.0,
+        "sampling.near_deviation is {near_deviation}, expected a length of unit space, 0 or more"
+    );
+    Ok(())
 }

@@ -8,7 +8,7 @@ use std::{
 use serde::Serialize;
 
 use super::{damage::Damage, reader::Recording};
-use crate::error::CaptureError;
+use crate::{calibration::Calibration, error::CaptureError};
 
 /// A summary of a recording.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -28,6 +28,7 @@ pub struct Info {
     /// How often each kind of event happened.
     pub events: BTreeMap<String, usize>,
     pub damage: Option<Damage>,
+    pub calibration: Calibration,
 }
 
 /// Opens a recording, reads all of it once, and sums it up.
@@ -64,5 +65,6 @@ pub fn info(path: &Path) -> Result<Info, CaptureError> {
         metadata: metadata.collect(),
         events,
         damage,
+        calibration: calibration.clone(),
     })
 }

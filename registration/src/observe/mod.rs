@@ -51,7 +51,7 @@ impl Observation {
         let points = sample(clean, world_from_camera, person_px, config.points);
         let extent = Extent::of(&points)?;
         let mut view = View::new(clean, camera, world_from_camera, config.cell_m)?;
-        view.noise_m = noise_m(&points);
+        view.noise_m = face_on_m(points.iter().map(|point| point.sigma_m))?;
         if let Some(floor) = clean.floor {
             let depth_m = (view.camera_from_world * extent.center).z;
             view.ground_m = ground_m(view.noise_m, floor.offset_m.abs() / depth_m.max(0.5));
@@ -70,11 +70,15 @@ impl Observation {
     }
 }
 
-/// Standard deviation of what is seen face on: most of a body is seen at an angle, so it is among the smallest.
-fn noise_m(points: &[DataPoint]) -> f32 {
-    let mut sigmas: Vec<f32> = points.iter().map(|point| point.sigma_m).collect();
-    let rank = sigmas.len() / 10;
-    *sigmas.select_nth_unstable_by(rank, f32::total_cmp).1
+/// Standard deviation of what is seen face on, of those of a person's points: most of a body is seen at an angle, so it is
+/// among the smallest. `None` of no points.
+pub(crate) fn face_on_m(sigmas_m: impl Iterator<Item = f32>) -> Option<f32> {
+    let mut sigmas_m: Vec<f32> = sigmas_m.collect();
+    if sigmas_m.is_empty() {
+        return None;
+    }
+    let rank = sigmas_m.len() / 10;
+    Some(*sigmas_m.select_nth_unstable_by(rank, f32::total_cmp).1)
 }
 
 /// Up to where cleaning takes depth for the floor: a skin, and three standard deviations of the depth as they show

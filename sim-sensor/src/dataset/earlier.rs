@@ -7,7 +7,7 @@ use glam::Vec3;
 
 use super::{
     archive::Unpacker,
-    packing::{betas, plan, skinning},
+    packing::{betas, ids, plan, skinning},
     sequence::{Sequence, SequenceFrame},
 };
 
@@ -37,10 +37,7 @@ pub(super) fn unpack(zip: &mut Unpacker<'_>) -> Result<Sequence, String> {
         ));
     }
     let triangle_count = triangles.len() as u64 / 3;
-    let ids = zip.array::<u64>("id", &[])?;
-    if ids.is_empty() {
-        return Err("array id: expected at least one frame".to_owned());
-    }
+    let ids = ids(zip)?;
     let count = ids.len() as u64;
     let theta = zip.vectors("theta", &[count, 24, 3])?;
     let trans = zip.vectors("trans", &[count, 3])?;

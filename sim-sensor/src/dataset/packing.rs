@@ -92,6 +92,15 @@ pub(super) fn plan(zip: &mut Unpacker<'_>) -> Result<SequencePlan, String> {
         .map_err(|error| format!("array plan: {error}"))
 }
 
+/// The numbers of the frames, one at least.
+pub(super) fn ids(zip: &mut Unpacker<'_>) -> Result<Vec<u64>, String> {
+    let ids = zip.array::<u64>("id", &[])?;
+    if ids.is_empty() {
+        return Err("array id: expected at least one frame".to_owned());
+    }
+    Ok(ids)
+}
+
 /// The person's shape.
 pub(super) fn betas(zip: &mut Unpacker<'_>) -> Result<[f32; 10], String> {
     let betas = zip.array::<f32>("betas", &[10])?;
@@ -236,10 +245,7 @@ fn read_triangles(zip: &mut Unpacker<'_>, vertices: usize) -> Result<Vec<[u32; 3
 
 /// Frames whose surfaces are still missing.
 fn read_frames(zip: &mut Unpacker<'_>, triangles: usize) -> Result<Vec<SequenceFrame>, String> {
-    let ids = zip.array::<u64>("id", &[])?;
-    if ids.is_empty() {
-        return Err("array id: expected at least one frame".to_owned());
-    }
+    let ids = ids(zip)?;
     let count = ids.len() as u64;
     let theta = zip.vectors("theta", &[count, 24, 3])?;
     let trans = zip.vectors("trans", &[count, 3])?;

@@ -28,7 +28,7 @@ use crate::{
     cli::{TrainArgs, TrainHyperArgs, TrainPreset, TrainShared, TrainWhat},
     files,
     interrupt::Stopped,
-    pipeline::settings::Settings,
+    pipeline::settings::{Settings, check_sampling},
     say::say,
 };
 
@@ -241,10 +241,5 @@ fn check(config: &PriorConfig) -> anyhow::Result<()> {
     for (name, count) in counts {
         ensure!(count >= 1, "{name} is 0, expected at least 1");
     }
-    let near_deviation = config.sampling.near_deviation;
-    ensure!(
-        near_deviation.is_finite() && near_deviation >= 0.0,
-        "sampling.near_deviation is {near_deviation}, expected a length of unit space, 0 or more"
-    );
-    Ok(())
+    check_sampling(&config.sampling)
 }
