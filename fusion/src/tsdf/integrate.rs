@@ -1,8 +1,7 @@
 //! Adds a depth map to a volume.
 #![expect(
     clippy::inline_always,
-    clippy::needless_bitwise_bool,
-    reason = "compiled anew for each vector unit, inside `simd::run`, where shortcuts stand in the way"
+    reason = "compiled anew for each vector unit, inside `simd::run`"
 )]
 
 use effigy_capture::{CameraModel, Distortion, Intrinsics};
@@ -59,9 +58,9 @@ struct Projection<'a> {
     config: &'a TsdfConfig,
     camera: &'a CameraModel,
     seen: &'a Seen,
-    /// Where what is seen begins in the picture, and how large it is, in pixels.
+    /// Where what is seen begins in the picture, in pixels, and how many rows it has.
     corner: [f32; 2],
-    size: [f32; 2],
+    rows: u32,
     /// In camera space, the volume's origin and one voxel along each axis.
     origin: Vec3,
     axes: Mat3,
@@ -91,7 +90,7 @@ impl<'a> Projection<'a> {
             camera: view.camera,
             seen,
             corner: [region.columns.start as f32, region.rows.start as f32],
-            size: [region.columns.len() as f32, region.rows.len() as f32],
+            rows: region.rows.len() as u32,
             origin: camera_from_volume.translation,
             axes,
             in_layer,
@@ -174,16 +173,18 @@ impl<'a> Projection<'a> {
                 (u[i], v[i]) = (pixel.x - left, pixel.y - top);
             }
         }
-        let [right, bottom] = self.size.map(|size| size - 0.5);
-        let columns = self.seen.columns as u32;
+        let [columns, rows] = [self.seen.columns as u32, self.rows];
+        let nothing = self.seen.nothing();
         let mut pixels = [0; LAYER];
         for i in 0..LAYER {
+            // Left of the picture and above it is far right and below as well.
+            let (column, row) = (nearest_whole(u[i]) as u32, nearest_whole(v[i]) as u32);
             let inside =
-                (z[i] > 0.0) & (u[i] > -0.5) & (v[i] > -0.5) & (u[i] < right) & (v[i] < bottom);
-            let pixel = (nearest_whole(v[i]) as u32)
-                .wrapping_mul(columns)
-                .wrapping_add(nearest_whole(u[i]) as u32);
-            pixels[i] = if inside { pixel } else { self.seen.nothing() };
+                u32::from(z[i] > 0.0) & u32::from(column < columns) & u32::from(row < rows);
+            // Bits instead of a choice, which becomes a branch for each voxel.
+            let mask = inside.wrapping_neg();
+            let pixel = row.wrapping_mul(columns).wrapping_add(column);
+            pixels[i] = (pixel & mask) | (nothing & !mask);
         }
         pixels
     }

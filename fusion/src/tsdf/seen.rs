@@ -51,6 +51,7 @@ impl Seen {
 }
 
 /// Of the surface at a pixel. Without a normal distances are measured along the pixel's ray.
+#[inline]
 fn plane_of(view: &DepthView<'_>, pixel: usize) -> Option<Vec4> {
     let surface = view.points.points[pixel];
     if surface.z.is_nan() {

@@ -101,6 +101,7 @@ impl Reach {
         let mut blocks: Vec<IVec3> = Vec::new();
         // What the pixel before reached: mostly the same.
         let mut before = vec![[i32::MAX; 3]; self.offsets_m.len()];
+        let mut noted = Noted::default();
         let mut reached = vec![[[0; LANES]; 3]; self.offsets_m.len()];
         for y in rows {
             let row = &view.points.points[y * width..][..width];
@@ -121,8 +122,9 @@ impl Reach {
                     touched_rows = touched_rows.start.min(y)..y + 1;
                     for (step, before) in reached.iter().zip(&mut before) {
                         let block = [step[0][i], step[1][i], step[2][i]];
-                        if block != *before {
-                            *before = block;
+                        let is_other = block != *before;
+                        *before = block;
+                        if is_other && noted.is_new(block) {
                             blocks.push(IVec3::from_array(block));
                         }
                     }
@@ -160,6 +162,28 @@ impl Reach {
                 }
             }
         }
+    }
+}
+
+/// Most of the blocks that were there already: a place for each of a few neighbours, the last of which it keeps.
+struct Noted([[i32; 3]; Self::SIDE.pow(3)]);
+
+impl Noted {
+    /// Blocks that a person's rows of pixels reach are not as many along any axis.
+    const SIDE: usize = 8;
+
+    fn is_new(&mut self, block: [i32; 3]) -> bool {
+        let [x, y, z] = block.map(|x| x as usize % Self::SIDE);
+        let last = &mut self.0[(z * Self::SIDE + y) * Self::SIDE + x];
+        let is_new = *last != block;
+        *last = block;
+        is_new
+    }
+}
+
+impl Default for Noted {
+    fn default() -> Self {
+        Self([[i32::MAX; 3]; Self::SIDE.pow(3)])
     }
 }
 
