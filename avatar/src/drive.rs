@@ -17,21 +17,12 @@ use crate::{
     skinning::{Skinning, Warp},
 };
 
-/// How vertices find the zero level of a new pose.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case", deny_unknown_fields)]
-pub enum Projection {
-    /// Along each vertex's own canonical normal; a step costs one field value for each vertex that the step
-    /// before moved far.
-    AlongNormals { steps: usize },
-    /// Newton steps along the field's gradient; a step costs twice that, and triangles may drift.
-    AlongGradients { steps: usize },
-}
-
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct DriveConfig {
-    pub projection: Projection,
+    /// How often a vertex looks for the zero level of a new pose, along its own canonical normal; each time costs one field
+    /// value for each vertex that the time before moved far.
+    pub steps: usize,
     /// A vertex that a step along its normal moved by less takes no further one: what is left is a tenth.
     pub settled_m: f32,
     /// No vertex leaves its place in the topology by more: clothes on a body move by centimetres.
@@ -40,11 +31,7 @@ pub struct DriveConfig {
 
 impl Default for DriveConfig {
     fn default() -> Self {
-        Self {
-            projection: Projection::AlongNormals { steps: 3 },
-            settled_m: 0.003,
-            max_offset_m: 0.05,
-        }
+        Self { steps: 3, settled_m: 0.003, max_offset_m: 0.05 }
     }
 }
 
@@ -213,14 +200,9 @@ impl Driver {
     }
 
     /// How far each vertex lies along its topology normal from its topology place in a pose, metres; found in the full
-    /// field and along normals, whatever the configuration says.
+    /// field.
     pub fn offsets_m(&mut self, pose: &PoseInput) -> &[f32] {
-        let sdf = self.avatar.field.field(pose);
-        let steps = match self.config.projection {
-            Projection::AlongNormals { steps } | Projection::AlongGradients { steps } => steps,
-        };
-        let longest = self.start_from_topology();
-        self.project_along_normals(&*sdf, steps, longest);
+        self.place_by_field(pose);
         let metres_per_unit = self.avatar.subject.unit_box.metres_per_unit();
         for offset in &mut self.offsets {
             *offset *= metres_per_unit;
@@ -228,35 +210,18 @@ impl Driver {
         &self.offsets
     }
 
-    /// Moves the topology's vertices onto the zero level of this field; the result is in `self.points`.
+    /// Moves the topology's vertices onto the zero level of this field; the result is in `self.points`, how far each went
+    /// in `self.offsets`, both in unit lengths.
     fn project(&mut self, sdf: &dyn SignedDistanceField) {
-        let longest = self.start_from_topology();
-        match self.config.projection {
-            Projection::AlongNormals { steps } => self.project_along_normals(sdf, steps, longest),
-            Projection::AlongGradients { steps } => {
-                for _ in 0..steps {
-                    self.field_at
-                        .step_onto_surface(sdf, &mut self.points, longest);
-                }
-            }
-        }
-    }
-
-    /// Puts the vertices to their topology places; how far they may go from there, in unit lengths.
-    fn start_from_topology(&mut self) -> f32 {
-        self.points
-            .clone_from(&self.avatar.topology.vertices_in_unit);
-        self.config.max_offset_m / self.avatar.subject.unit_box.metres_per_unit()
-    }
-
-    fn project_along_normals(&mut self, sdf: &dyn SignedDistanceField, steps: usize, longest: f32) {
         let topology = &self.avatar.topology;
         let metres_per_unit = self.avatar.subject.unit_box.metres_per_unit();
         let settled = self.config.settled_m / metres_per_unit;
+        let longest = self.config.max_offset_m / metres_per_unit;
+        self.points.clone_from(&topology.vertices_in_unit);
         self.offsets.fill(0.0);
         self.open.clear();
         self.open.extend(0..self.points.len() as u32);
-        for _ in 0..steps {
+        for _ in 0..self.config.steps {
             self.queries.clear();
             self.queries
                 .extend(self.open.iter().map(|&vertex| self.points[vertex as usize]));
@@ -360,33 +325,28 @@ mod tests {
     #[test]
     fn vertices_follow_a_field_that_changes_with_the_pose() {
         let growth_m = 0.012;
-        for projection in [
-            Projection::AlongNormals { steps: 2 },
-            Projection::AlongGradients { steps: 2 },
-        ] {
-            let config = DriveConfig { projection, ..DriveConfig::default() };
-            let mut driver = Driver::new(Arc::new(suit_avatar(growth_m)), config);
-            let params = everyday_poses()[2];
-            let driven = driver.pose(&params, FrameId(0));
-            let subject = driver.avatar().subject;
-            let sdf = driver
-                .avatar()
-                .field
-                .field(&subject.pose_input(&params.theta));
-            let in_unit: Vec<Vec3> = driven
-                .canonical
-                .iter()
-                .map(|&vertex| subject.unit_box.unit_from_canonical(vertex))
-                .collect();
-            let mut values = vec![0.0; in_unit.len()];
-            sdf.values(&in_unit, &mut values);
-            let off_mm = |value: f32| value.abs() * subject.unit_box.metres_per_unit() * 1e3;
-            let mean = values.iter().map(|&value| off_mm(value)).sum::<f32>() / values.len() as f32;
-            println!("{projection:?}: mean {mean:.3} mm off the surface");
-            // 1.6 rad of bent knee and elbow grow the suit by 19 mm; folds, where the nearest body point
-            // jumps, keep a little of it.
-            assert!(mean < 0.8);
-        }
+        let config = DriveConfig { steps: 2, ..DriveConfig::default() };
+        let mut driver = Driver::new(Arc::new(suit_avatar(growth_m)), config);
+        let params = everyday_poses()[2];
+        let driven = driver.pose(&params, FrameId(0));
+        let subject = driver.avatar().subject;
+        let sdf = driver
+            .avatar()
+            .field
+            .field(&subject.pose_input(&params.theta));
+        let in_unit: Vec<Vec3> = driven
+            .canonical
+            .iter()
+            .map(|&vertex| subject.unit_box.unit_from_canonical(vertex))
+            .collect();
+        let mut values = vec![0.0; in_unit.len()];
+        sdf.values(&in_unit, &mut values);
+        let off_mm = |value: f32| value.abs() * subject.unit_box.metres_per_unit() * 1e3;
+        let mean = values.iter().map(|&value| off_mm(value)).sum::<f32>() / values.len() as f32;
+        println!("mean {mean:.3} mm off the surface");
+        // 1.6 rad of bent knee and elbow grow the suit by 19 mm; folds, where the nearest body point
+        // jumps, keep a little of it.
+        assert!(mean < 0.8);
     }
 
     #[test]

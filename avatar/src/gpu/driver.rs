@@ -14,7 +14,7 @@ use super::{
     layout::{self, PoseBlock, rows},
 };
 use crate::{
-    drive::{AvatarMesh, Driver, Projection},
+    drive::{AvatarMesh, Driver},
     model::Avatar,
     sdf::{SirenConfig, SirenField},
 };
@@ -214,14 +214,12 @@ impl Buffers {
 
 /// The field's shape and the steps along normals, if the kernels can do what this driver does.
 pub(super) fn can_drive(driver: &Driver) -> Result<(SirenConfig, u32), GpuError> {
-    let Projection::AlongNormals { steps } = driver.config().projection else {
-        return Err(GpuError::AlongGradients);
-    };
     let avatar = driver.avatar();
     let params = BodyParams { theta: avatar.topology_theta, ..BodyParams::ZERO };
     let config = siren(avatar, &params)?.config();
     kernels::can_evaluate(config)?;
-    Ok((config, u32::try_from(steps).unwrap_or(u32::MAX)))
+    let steps = u32::try_from(driver.config().steps).unwrap_or(u32::MAX);
+    Ok((config, steps))
 }
 
 fn siren(avatar: &Avatar, params: &BodyParams) -> Result<SirenField, GpuError> {

@@ -21,8 +21,6 @@ pub enum GpuError {
         config.hidden
     )]
     FieldShape { config: SirenConfig },
-    #[error("vertices are asked to follow the field's gradients, the kernels follow normals")]
-    AlongGradients,
     #[error("{adapter} was lost: {why}")]
     Lost { adapter: String, why: String },
     #[error("{adapter} failed: {why}")]

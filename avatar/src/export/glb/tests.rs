@@ -9,7 +9,7 @@ use gltf_json::animation::Property;
 use super::*;
 use crate::{
     bake::BakeConfig,
-    drive::{DriveConfig, Driver, Projection},
+    drive::{DriveConfig, Driver},
     testing::{everyday_poses, suit_avatar},
 };
 
@@ -32,8 +32,7 @@ fn motion() -> Motion {
 fn one_blend_of_the_zero_pose_mesh_is_the_drivers_pose() {
     let avatar = Arc::new(suit_avatar(0.0));
     let params = everyday_poses()[2];
-    let still =
-        DriveConfig { projection: Projection::AlongNormals { steps: 0 }, ..DriveConfig::default() };
+    let still = DriveConfig { steps: 0, ..DriveConfig::default() };
     let driven = Driver::new(Arc::clone(&avatar), still).pose(&params, FrameId(0));
     let (bones, _) = BoneTransforms::from_pose(&params.theta, &avatar.subject.rest_joints);
     let zero_pose = zero_pose_vertices(&avatar, None);

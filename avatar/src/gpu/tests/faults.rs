@@ -10,9 +10,8 @@ use super::{
     assert_same, driver, gpu, prior_avatar, random_avatar,
 };
 use crate::{
-    DriveConfig, Driver, LiveDriver, PoseField, PoseInput, SignedDistanceField,
+    LiveDriver, PoseField, PoseInput, SignedDistanceField,
     baselines::{Architecture, ConditionedField},
-    drive::Projection,
     hyper,
     model::Avatar,
     sdf::{SirenConfig, SirenField},
@@ -70,13 +69,6 @@ fn too_large_a_buffer_is_an_error_and_not_the_end() {
 
 #[test]
 fn what_the_kernels_do_not_do_is_refused_with_its_reason() {
-    let along_gradients = DriveConfig {
-        projection: Projection::AlongGradients { steps: 2 },
-        ..DriveConfig::default()
-    };
-    let prior = Driver::new(Arc::new(prior_avatar()), along_gradients);
-    assert_eq!(can_drive(&prior), Err(GpuError::AlongGradients));
-
     let baseline = ConditionedField::new(Architecture::Siren, 1);
     let kind = baseline.kind().to_owned();
     let baseline = Avatar { field: Arc::new(baseline), ..prior_avatar() };
