@@ -3,7 +3,10 @@
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    align::EnergyConfig, fit::FitConfig, initialize::InitializeConfig, observe::ObserveConfig,
+    align::{Effort, EnergyConfig},
+    fit::FitConfig,
+    initialize::InitializeConfig,
+    observe::ObserveConfig,
 };
 
 /// Everything that can be set about tracking.
@@ -45,6 +48,18 @@ pub struct TrackConfig {
 }
 
 impl TrackConfig {
+    /// How a frame's body is looked for, close to where it is.
+    pub(super) fn effort(&self) -> Effort {
+        Effort {
+            rounds: self.rounds,
+            steps: self.steps,
+            every: 1,
+            drawn_visibility: true,
+            widen: 1.0,
+            settled_from: 0.3,
+        }
+    }
+
     /// How frames are looked at to follow a body in them.
     pub(super) fn looks(&self) -> ObserveConfig {
         ObserveConfig { points: self.points, cell_m: 0.01, min_px: self.min_person_px }

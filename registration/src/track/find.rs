@@ -8,7 +8,7 @@ use super::{
     tracked,
 };
 use crate::{
-    align::{Aligned, Effort, align},
+    align::{Aligned, align},
     fit::fit_one,
     initialize::{Searcher, Sight},
     observe::{Observation, ObserveConfig},
@@ -85,14 +85,7 @@ impl Tracker {
             &context,
         );
         self.shaped = self.dressed(&self.surface, fitted.betas);
-        let effort = Effort {
-            rounds: self.config.rounds,
-            steps: self.config.steps,
-            every: 1,
-            drawn_visibility: true,
-            widen: 1.0,
-            settled_from: 0.3,
-        };
+        let effort = self.config.effort();
         for aligned in found.iter_mut() {
             let mut start = aligned.state;
             start.betas = fitted.betas;

@@ -100,14 +100,7 @@ impl Tracker {
     ) -> Aligned {
         let predicted = body.predict(step_secs);
         let context = Context { whole, ..self.context(Some(&predicted)) };
-        let effort = Effort {
-            rounds: self.config.rounds,
-            steps: self.config.steps,
-            every: 1,
-            drawn_visibility: true,
-            widen: 2.0,
-            settled_from: 0.3,
-        };
+        let effort = Effort { widen: 2.0, ..self.config.effort() };
         align(
             &self.shaped,
             &predicted.state,

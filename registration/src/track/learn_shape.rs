@@ -47,14 +47,7 @@ impl Tracker {
             body.state.trans += shift;
             // The new shape settles in on the frame it was made in, so that the next one starts from rest.
             let context = Context { energy: &self.energy, predicted: None, grounded, whole: true };
-            let effort = Effort {
-                rounds: self.config.rounds,
-                steps: self.config.steps,
-                every: 2,
-                drawn_visibility: true,
-                widen: 1.0,
-                settled_from: 0.3,
-            };
+            let effort = Effort { every: 2, ..self.config.effort() };
             let settled = align(&self.shaped, &body.state, observation, &context, &effort);
             body.state = settled.state;
         }

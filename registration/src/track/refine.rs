@@ -64,14 +64,8 @@ impl Refiner {
             grounded: frame.clean.floor.is_some(),
             whole: true,
         };
-        let effort = Effort {
-            rounds: 2 * self.config.rounds,
-            steps: self.config.steps,
-            every: 1,
-            drawn_visibility: true,
-            widen: 1.0,
-            settled_from: 0.5,
-        };
+        let effort =
+            Effort { rounds: 2 * self.config.rounds, settled_from: 0.5, ..self.config.effort() };
         let start = BodyState::from_params(params);
         let found = align(&shaped, &start, &observation, &context, &effort);
         Ok(RegisteredFrame { tracking: tracked(&found), ..frame.clone() })
