@@ -13,27 +13,30 @@ pub struct LimbJoint {
     pub rotation: Quat,
 }
 
-/// Mean distance of estimated joints from true ones, over frames, for each limb joint.
+/// What SMPL's 24 joints are estimated to be in the truth's world space, and where the limbs' joints are.
+pub type EstimatedLimbs = ([Vec3; JOINT_COUNT], [LimbJoint; LIMB_JOINTS.len()]);
+
+/// In each frame, the distance of estimated joints from true ones.
 ///
 /// Skeletons disagree about where in the flesh a joint is. That is a constant offset in the bone's own axes, which is
-/// measured over all frames and removed. Estimates are SMPL's 24 joints in the truth's world space.
-pub fn limb_errors_m(
-    frames: &[([Vec3; JOINT_COUNT], [LimbJoint; LIMB_JOINTS.len()])],
-) -> [f32; LIMB_JOINTS.len()] {
-    let count = frames.len().max(1) as f32;
+/// measured over all frames and removed.
+pub fn limb_errors_m(frames: &[EstimatedLimbs]) -> Vec<[f32; LIMB_JOINTS.len()]> {
+    let offsets: Vec<_> = frames.iter().map(offsets).collect();
+    let count = offsets.len().max(1) as f32;
+    let constant: [Vec3; LIMB_JOINTS.len()] = std::array::from_fn(|limb| {
+        let sum: Vec3 = offsets.iter().map(|offsets| offsets[limb]).sum();
+        sum / count
+    });
+    let errors = |offsets: &[Vec3; LIMB_JOINTS.len()]| {
+        std::array::from_fn(|limb| offsets[limb].distance(constant[limb]))
+    };
+    offsets.iter().map(errors).collect()
+}
+
+/// How far off each joint is, in its bone's axes.
+fn offsets((estimated, truth): &EstimatedLimbs) -> [Vec3; LIMB_JOINTS.len()] {
     std::array::from_fn(|limb| {
-        let offsets: Vec<Vec3> = frames
-            .iter()
-            .map(|(estimated, truth)| {
-                let off = estimated[LIMB_JOINTS[limb]] - truth[limb].position;
-                truth[limb].rotation.inverse() * off
-            })
-            .collect();
-        let constant = offsets.iter().sum::<Vec3>() / count;
-        offsets
-            .iter()
-            .map(|offset| offset.distance(constant))
-            .sum::<f32>()
-            / count
+        let off = estimated[LIMB_JOINTS[limb]] - truth[limb].position;
+        truth[limb].rotation.inverse() * off
     })
 }

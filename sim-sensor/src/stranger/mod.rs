@@ -20,7 +20,7 @@ mod skin;
 mod tests;
 
 pub use character::Character;
-pub use limbs::{LIMB_JOINTS, LimbJoint, limb_errors_m};
+pub use limbs::{EstimatedLimbs, LIMB_JOINTS, LimbJoint, limb_errors_m};
 
 use skeleton::Clip;
 

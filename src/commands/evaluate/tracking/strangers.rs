@@ -7,7 +7,7 @@ use effigy_registration::{
 };
 use effigy_sim_sensor::{
     StrangerTruth,
-    stranger::{LIMB_JOINTS, LimbJoint},
+    stranger::{EstimatedLimbs, LIMB_JOINTS, LimbJoint, limb_errors_m},
 };
 use glam::Vec3;
 
@@ -17,8 +17,9 @@ use super::score::{BodyErrors, FrameScore, Judge, State, is_swapped};
 pub(super) struct StrangerJudge<'a> {
     judge: Judge<'a>,
     truth: StrangerTruth,
-    /// Number of the scored frame, and for each limb its error in the bone's own axes, in metres.
-    offsets: Vec<(usize, [Vec3; LIMB_JOINTS.len()])>,
+    /// Numbers of the scored frames in which somebody was found, and what was found there.
+    found_in: Vec<usize>,
+    limbs: Vec<EstimatedLimbs>,
     scored: usize,
 }
 
@@ -27,7 +28,7 @@ impl<'a> StrangerJudge<'a> {
         let weights = &truth.character().weights;
         let parts = weights.iter().map(VertexWeights::main_bone).collect();
         let judge = judge.with_parts(parts);
-        Self { judge, truth, offsets: Vec::new(), scored: 0 }
+        Self { judge, truth, found_in: Vec::new(), limbs: Vec::new(), scored: 0 }
     }
 
     pub(super) fn score(
@@ -50,8 +51,8 @@ impl<'a> StrangerJudge<'a> {
             .joints(registered)
             .map(|found| found.map(|joint| truth_from_found * joint));
         if let Some(joints) = &joints {
-            self.offsets
-                .push((self.scored, offsets(joints, &truth.limbs)));
+            self.found_in.push(self.scored);
+            self.limbs.push((*joints, truth.limbs));
         }
         self.scored += 1;
         FrameScore {
@@ -68,26 +69,15 @@ impl<'a> StrangerJudge<'a> {
 
     /// Takes each joint's constant offset in its bone's axes out of its errors.
     pub(super) fn remove_offsets(&self, frames: &mut [FrameScore]) {
-        let count = self.offsets.len().max(1) as f32;
-        for (limb, &joint) in LIMB_JOINTS.iter().enumerate() {
-            let sum: Vec3 = self.offsets.iter().map(|(_, offsets)| offsets[limb]).sum();
-            for (frame, offsets) in &self.offsets {
-                if let Some(errors) = &mut frames[*frame].errors {
-                    errors.joints_mm[joint] = offsets[limb].distance(sum / count) * 1e3;
+        let errors_m = limb_errors_m(&self.limbs);
+        for (frame, errors_m) in self.found_in.iter().zip(errors_m) {
+            if let Some(errors) = &mut frames[*frame].errors {
+                for (joint, error_m) in LIMB_JOINTS.into_iter().zip(errors_m) {
+                    errors.joints_mm[joint] = error_m * 1e3;
                 }
             }
         }
     }
-}
-
-fn offsets(
-    joints: &[Vec3; JOINT_COUNT],
-    limbs: &[LimbJoint; LIMB_JOINTS.len()],
-) -> [Vec3; LIMB_JOINTS.len()] {
-    std::array::from_fn(|limb| {
-        let off = joints[LIMB_JOINTS[limb]] - limbs[limb].position;
-        limbs[limb].rotation.inverse() * off
-    })
 }
 
 fn errors(joints: &[Vec3; JOINT_COUNT], limbs: &[LimbJoint; LIMB_JOINTS.len()]) -> BodyErrors {
