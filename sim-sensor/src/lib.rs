@@ -22,7 +22,7 @@ pub mod truth;
 
 pub use error::SimError;
 pub use person::{Outfit, OutfitKind, Person};
-pub use preset::SensorPreset;
+pub use preset::{Mount, SensorPreset};
 pub use scenario::{Likeness, MotionChoice, Noise, Room, Scenario};
 pub use sensor::SimulatedSensor;
 pub use stranger::{StrangerChoice, StrangerTruth};

@@ -33,12 +33,15 @@ pub enum Defects {
     StructuredLight(StructuredLight),
 }
 
-/// Where a camera stands: far enough away for a tall person's raised hands and both feet to be in view.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Mount {
-    height_m: f32,
-    distance_m: f32,
-    down_rad: f32,
+/// Where a camera stands: in front of the origin, looking along -z.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Mount {
+    pub height_m: f32,
+    /// From where the person begins.
+    pub distance_m: f32,
+    /// How far it is tilted down.
+    pub down_rad: f32,
 }
 
 const METRES_PER_UNIT: f32 = 0.001;
@@ -192,7 +195,8 @@ impl SensorPreset {
         }
     }
 
-    fn mount(self) -> Mount {
+    /// Far enough away for a tall person's raised hands and both feet to be in view.
+    pub fn mount(self) -> Mount {
         match self {
             Self::Azure | Self::D435 | Self::D455 => {
                 Mount { height_m: 1.20, distance_m: 2.45, down_rad: 0.02 }
@@ -204,8 +208,7 @@ impl SensorPreset {
 }
 
 impl Mount {
-    /// In front of the origin, looking along -z and a little down.
-    fn world_from_camera(self) -> Rigid3 {
+    pub fn world_from_camera(self) -> Rigid3 {
         // Half a turn about x makes "down, forward" of "up, backward"; less than that tilts down.
         let rotation = Quat::from_rotation_x(std::f32::consts::PI - self.down_rad);
         let translation: Vec3 = vec3(0.0, self.height_m, self.distance_m);

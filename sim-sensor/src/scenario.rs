@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 use crate::{
     error::SimError,
     person::{Material, Outfit, OutfitKind, Person, sample_betas},
-    preset::SensorPreset,
+    preset::{Mount, SensorPreset},
     random::Randomness,
     stranger::StrangerChoice,
 };
@@ -24,6 +24,9 @@ pub struct Scenario {
     pub version: u32,
     pub seed: u64,
     pub sensor: SensorPreset,
+    /// Where the sensor stands; where the whole person is in view, whatever they do, where none is given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mount: Option<Mount>,
     pub motion: MotionChoice,
     pub outfit: OutfitKind,
     /// Whether the body model can be the person exactly.
@@ -109,6 +112,7 @@ impl Default for Scenario {
             version: SCENARIO_VERSION,
             seed: 1,
             sensor: SensorPreset::Azure,
+            mount: None,
             motion: MotionChoice::Routine(Routine::Mixture),
             outfit: OutfitKind::Demo,
             likeness: Likeness::Model,
@@ -148,10 +152,13 @@ impl Scenario {
         (self.seconds * self.rate_hz()).round().max(1.0) as u64
     }
 
-    /// The sensor's calibration at this scenario's rate, with a colour camera where colour is asked for.
+    /// The sensor's calibration at this scenario's rate and place, with a colour camera where colour is asked for.
     pub fn calibration(&self) -> Calibration {
         let mut calibration = self.sensor.calibration();
         calibration.rate_hz = self.rate_hz();
+        if let Some(mount) = self.mount {
+            calibration.world_from_camera = Some(mount.world_from_camera());
+        }
         if self.color {
             calibration.color = Some(self.sensor.color_camera());
             calibration.color_from_depth = self.sensor.color_from_depth();
@@ -271,6 +278,17 @@ impl Scenario {
         )?;
         let late = (0.0..=1.0).contains(&self.late_share);
         check(late, "late_share", self.late_share.to_string(), "0 to 1")?;
+        let stands = self.mount.is_none_or(|mount| {
+            (0.3..=10.0).contains(&mount.distance_m)
+                && (0.0..=5.0).contains(&mount.height_m)
+                && mount.down_rad.abs() <= 1.5
+        });
+        check(
+            stands,
+            "mount",
+            format!("{:?}", self.mount),
+            "a distance of 0.3 to 10 m, a height of 0 to 5 m, a tilt of at most 1.5 rad",
+        )?;
         let height_m = self.stranger.as_ref().and_then(|choice| choice.height_m);
         check(
             height_m.is_none_or(|height_m| (0.3..=3.0).contains(&height_m)),
@@ -300,6 +318,7 @@ mod tests {
         let scenario = Scenario {
             motion: MotionChoice::Routine(Routine::Squat),
             betas: Some([0.5; 10]),
+            mount: Some(Mount { height_m: 1.1, distance_m: 2.0, down_rad: 0.0 }),
             ..Scenario::default()
         };
         assert_eq!(Scenario::from_json(&scenario.to_json()).unwrap(), scenario);
@@ -312,5 +331,7 @@ mod tests {
             .to_string();
         assert!(error.contains('9') && error.contains("version"), "{error}");
         assert!(Scenario::from_json(r#"{"seconds":-1.0}"#).is_err());
+        let far = r#"{"mount":{"height_m":1.0,"distance_m":40.0,"down_rad":0.0}}"#;
+        assert!(Scenario::from_json(far).is_err());
     }
 }

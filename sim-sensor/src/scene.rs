@@ -42,8 +42,13 @@ impl Scene {
         let mut person = scenario.person(body, outfit);
         let cloth = worn(&scenario, &mut person);
         let motion = scenario.motion(&person.rest_body())?;
-        let world_from_camera = scenario.calibration().world_from_camera.unwrap_or_default();
+        let world_from_camera = place(&scenario);
         Ok(Self { scenario, person, world_from_camera, motion, cloth })
+    }
+
+    /// The same person in the same clothes before another sensor.
+    pub(crate) fn seen_as(&self, scenario: &Scenario) -> Self {
+        Self { scenario: scenario.clone(), world_from_camera: place(scenario), ..self.clone() }
     }
 
     pub(crate) fn motion_secs(&self) -> f32 {
@@ -99,6 +104,11 @@ impl Scene {
     pub(crate) fn is_in_cloth(&self) -> bool {
         self.cloth.is_some()
     }
+}
+
+/// Where the scenario's sensor stands.
+fn place(scenario: &Scenario) -> Rigid3 {
+    scenario.calibration().world_from_camera.unwrap_or_default()
 }
 
 /// Cuts the simulated clothes a scenario asks for; the person's paint learns their colours.

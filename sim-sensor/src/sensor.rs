@@ -8,6 +8,7 @@ use effigy_registration::BodyModel;
 use crate::{
     error::SimError,
     noise,
+    preset::{Mount, SensorPreset},
     render::{ColorCamera, Renderer, View},
     scenario::{Noise, Scenario},
     scene::Scene,
@@ -37,6 +38,22 @@ impl SimulatedSensor {
         } else {
             Actor::Person(Box::new(Scene::new(&scenario, body)?))
         };
+        Ok(Self::before(actor, scenario))
+    }
+
+    /// Another sensor before the same person. Clothes are simulated once for both while neither runs ahead; the other one's
+    /// frames come at this one's rate. `None` before somebody else's character.
+    pub fn beside(&self, sensor: SensorPreset, mount: Option<Mount>) -> Option<Self> {
+        let Actor::Person(scene) = &self.actor else {
+            return None;
+        };
+        let rate_hz = Some(self.scenario.rate_hz());
+        let scenario = Scenario { sensor, mount, rate_hz, ..self.scenario.clone() };
+        let scene = scene.seen_as(&scenario);
+        Some(Self::before(Actor::Person(Box::new(scene)), scenario))
+    }
+
+    fn before(actor: Actor, scenario: Scenario) -> Self {
         let calibration = scenario.calibration();
         let world_from_camera = calibration.world_from_camera.unwrap_or_default();
         let room = scenario.room;
@@ -50,7 +67,7 @@ impl SimulatedSensor {
             color = color.map(ColorCamera::two_sided);
         }
         let exposure = noise::Exposure::new(&calibration, scenario.sensor.defects());
-        Ok(Self { scenario, calibration, actor, renderer, exposure, color, next: 0 })
+        Self { scenario, calibration, actor, renderer, exposure, color, next: 0 }
     }
 
     /// What an ideal sensor would see in one frame: true depth, normals, labels, colour.

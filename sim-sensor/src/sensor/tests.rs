@@ -67,6 +67,28 @@ fn frames_repeat_bit_for_bit_and_do_not_depend_on_order() {
 }
 
 #[test]
+fn sensors_beside_each_other_see_what_each_sees_alone() {
+    let mount = Mount { height_m: 1.1, distance_m: 2.0, down_rad: 0.0 };
+    let scenario = Scenario {
+        outfit: OutfitKind::TshirtTrousers,
+        ..scenario(SensorPreset::Azure, Routine::Wave)
+    };
+    let mut azure = SimulatedSensor::new(&scenario, builtin::body()).unwrap();
+    let mut beside = azure.beside(SensorPreset::D435, Some(mount)).unwrap();
+    let alone = Scenario { sensor: SensorPreset::D435, mount: Some(mount), ..scenario };
+    let mut alone = SimulatedSensor::new(&alone, builtin::body()).unwrap();
+    for id in [0, 1, 2].map(FrameId) {
+        azure.expose(id).unwrap();
+        let (seen, expected) = (beside.expose(id).unwrap(), alone.expose(id).unwrap());
+        assert_eq!(seen.depth.pixels(), expected.depth.pixels());
+        assert_eq!(seen.timestamp, expected.timestamp);
+    }
+    assert_eq!(beside.calibration(), alone.calibration());
+    let place = beside.truth().unwrap().at(FrameId(0)).world_from_camera;
+    assert_eq!(place.translation, Vec3::new(0.0, 1.1, 2.0));
+}
+
+#[test]
 fn dropped_frames_leave_gaps_and_the_count_knows_it() {
     let scenario = Scenario {
         seconds: 1.0,

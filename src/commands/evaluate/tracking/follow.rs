@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use anyhow::Context as _;
 use effigy_avatar::skinning::star_body;
 use effigy_capture::{Frame, FrameId, Intrinsics, Timestamp};
 use effigy_fusion::clean::Cleaner;
@@ -17,52 +18,100 @@ use super::{
     suite::{Case, Purpose},
 };
 
-/// Follows a case's person and scores every frame.
+/// Follows one person with every case's sensor, frame by frame, and scores all frames: clothes are simulated once for
+/// all. `cases` differ in their sensors alone.
 pub(super) fn follow(
-    case: &Case,
+    cases: &[&Case],
     body: &Arc<BodyModel>,
     options: &Options,
-) -> anyhow::Result<CaseScores> {
-    let mut sensor = SimulatedSensor::new(&case.scenario, Arc::clone(body))?;
-    let calibration = effigy_capture::FrameSource::calibration(&sensor).clone();
-    let truth = sensor.truth();
-    let mut reality = Reality::new(case, body, calibration.depth.intrinsics, truth)?;
-    let mut chain = Chain {
-        cleaner: Cleaner::new(calibration.clone(), options.clean.clone()),
-        // Where the camera stands is not told: the floor is found as on any other recording.
-        tracker: Tracker::new(
-            Arc::clone(body),
-            calibration.depth,
-            options.track.clone(),
-            None,
-        ),
-    };
-    let mut smoother = Smoother::new(options.smooth);
-    let moments = moments(case);
-    let mut scores = CaseScores::default();
+) -> anyhow::Result<Vec<CaseScores>> {
+    let (first, others) = cases.split_first().context("nobody to follow")?;
+    let sensor = SimulatedSensor::new(&first.scenario, Arc::clone(body))?;
+    let mut watches = Vec::with_capacity(cases.len());
+    for case in others {
+        let scenario = &case.scenario;
+        let beside = sensor.beside(scenario.sensor, scenario.mount);
+        let beside = beside.context("a stranger is watched by one sensor at a time")?;
+        watches.push(Watch::new(case, beside, body, options)?);
+    }
+    watches.insert(0, Watch::new(first, sensor, body, options)?);
+    let moments = moments(first);
     for (number, moment) in moments.iter().enumerate() {
-        let frame = exposure(&mut sensor, case, number as u64, moment)?;
-        let (registered, milliseconds) = chain.process(&frame)?;
-        let smooth = smoother.params(&registered);
+        for watch in &mut watches {
+            watch.look(number as u64, moment)?;
+        }
+    }
+    let scores = watches.into_iter().map(|watch| watch.finish(&moments));
+    Ok(scores.collect())
+}
+
+/// A sensor, the chain behind it, and how well that follows.
+struct Watch<'a> {
+    case: &'a Case,
+    sensor: SimulatedSensor,
+    body: &'a Arc<BodyModel>,
+    options: &'a Options,
+    reality: Reality<'a>,
+    chain: Chain,
+    smoother: Smoother,
+    scores: CaseScores,
+}
+
+impl<'a> Watch<'a> {
+    fn new(
+        case: &'a Case,
+        sensor: SimulatedSensor,
+        body: &'a Arc<BodyModel>,
+        options: &'a Options,
+    ) -> anyhow::Result<Self> {
+        let calibration = effigy_capture::FrameSource::calibration(&sensor).clone();
+        let truth = sensor.truth();
+        let reality = Reality::new(case, body, calibration.depth.intrinsics, truth)?;
+        let depth = calibration.depth;
+        let chain = Chain {
+            cleaner: Cleaner::new(calibration, options.clean.clone()),
+            // Where the camera stands is not told: the floor is found as on any other recording.
+            tracker: Tracker::new(Arc::clone(body), depth, options.track.clone(), None),
+        };
+        Ok(Self {
+            case,
+            sensor,
+            body,
+            options,
+            reality,
+            chain,
+            smoother: Smoother::new(options.smooth),
+            scores: CaseScores::default(),
+        })
+    }
+
+    fn look(&mut self, number: u64, moment: &Moment) -> anyhow::Result<()> {
+        let frame = exposure(&mut self.sensor, self.case, number, moment)?;
+        let (registered, milliseconds) = self.chain.process(&frame)?;
+        let smooth = self.smoother.params(&registered);
+        let content = FrameId(moment.content);
         let score = if moment.vanished.is_none() {
-            reality.score(
-                (&registered, smooth.as_ref()),
-                FrameId(moment.content),
-                milliseconds,
-            )
+            let found = (&registered, smooth.as_ref());
+            self.reality.score(found, content, milliseconds)
         } else {
             FrameScore::of_nobody(&registered, milliseconds)
         };
-        scores.frames.push(score);
-        if options.true_surface && registered.params().is_some() {
-            reality.tell_surface(FrameId(moment.content), &mut chain.tracker, body)?;
+        self.scores.frames.push(score);
+        if self.options.true_surface && registered.params().is_some() {
+            let tracker = &mut self.chain.tracker;
+            self.reality.tell_surface(content, tracker, self.body)?;
         }
-        chain.recycle(registered);
+        self.chain.recycle(registered);
+        Ok(())
     }
-    scores.losses = losses_of(&moments, &scores.frames);
-    scores.height_error_m = reality.height_error_m(body, chain.tracker.betas());
-    reality.finish(&mut scores.frames);
-    Ok(scores)
+
+    fn finish(self, moments: &[Moment]) -> CaseScores {
+        let Self { mut scores, reality, chain, body, .. } = self;
+        scores.losses = losses_of(moments, &scores.frames);
+        scores.height_error_m = reality.height_error_m(body, chain.tracker.betas());
+        reality.finish(&mut scores.frames);
+        scores
+    }
 }
 
 /// Whatever is true about the one who is followed.

@@ -48,7 +48,7 @@ pub(crate) fn explain_real_people(
     Ok(Table::of_real_people(real::rows(body, options)?))
 }
 
-/// Follows everybody of a suite, each case on one core; `go_on` hears how many cases are done and may stop it.
+/// Follows everybody of a suite, one person at a time on each core; `go_on` hears how many cases are done and may stop it.
 pub(crate) fn evaluate(
     cases: &[Case],
     body: &Arc<BodyModel>,
@@ -56,6 +56,7 @@ pub(crate) fn evaluate(
     go_on: &(dyn Fn(usize) -> bool + Sync),
 ) -> anyhow::Result<Table> {
     let options = &variant.of(options);
+    let groups = together(cases);
     let next = AtomicUsize::new(0);
     let finished = AtomicUsize::new(0);
     let work = || -> anyhow::Result<Vec<(usize, CaseScores)>> {
@@ -65,16 +66,16 @@ pub(crate) fn evaluate(
             .context("no thread to evaluate on")?;
         let mut scores = Vec::new();
         loop {
-            let index = next.fetch_add(1, Ordering::Relaxed);
-            if index >= cases.len() || !go_on(finished.load(Ordering::Relaxed)) {
+            let group = groups.get(next.fetch_add(1, Ordering::Relaxed));
+            let Some(group) = group.filter(|_| go_on(finished.load(Ordering::Relaxed))) else {
                 return Ok(scores);
-            }
-            let case = &cases[index];
-            let score = alone
-                .install(|| follow::follow(case, body, options))
-                .with_context(|| case.name())?;
-            scores.push((index, score));
-            finished.fetch_add(1, Ordering::Relaxed);
+            };
+            let seen: Vec<&Case> = group.iter().map(|&index| &cases[index]).collect();
+            let followed = alone
+                .install(|| follow::follow(&seen, body, options))
+                .with_context(|| seen[0].name())?;
+            scores.extend(group.iter().copied().zip(followed));
+            finished.fetch_add(group.len(), Ordering::Relaxed);
         }
     };
     let workers = thread::available_parallelism().map_or(1, usize::from);
@@ -91,4 +92,39 @@ pub(crate) fn evaluate(
         .into_iter()
         .map(|(index, score)| (&cases[index], score));
     Ok(Table::new(variant, scored))
+}
+
+/// The numbers of the cases that are followed at once: one sensor at a time, and all at a time where clothes are simulated.
+fn together(cases: &[Case]) -> Vec<Vec<usize>> {
+    let mut groups: Vec<Vec<usize>> = Vec::new();
+    for (index, case) in cases.iter().enumerate() {
+        let group = groups
+            .iter_mut()
+            .find(|group| cases[group[0]].shares_clothes_with(case));
+        match group {
+            Some(group) => group.push(index),
+            None => groups.push(vec![index]),
+        }
+    }
+    groups
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn all_sensors_see_simulated_clothes_at_once_and_everybody_is_followed_once() {
+        let suite = Suite::full();
+        let cases = suite.cases();
+        let groups = together(&cases);
+        let mut all: Vec<usize> = groups.iter().flatten().copied().collect();
+        all.sort_unstable();
+        assert_eq!(all, (0..cases.len()).collect::<Vec<_>>());
+        for group in &groups {
+            let in_cloth = cases[group[0]].scenario.outfit.cloth().is_some();
+            let expected = if in_cloth { suite.sensors.len() } else { 1 };
+            assert_eq!(group.len(), expected, "{}", cases[group[0]].name());
+        }
+    }
 }

@@ -3,10 +3,13 @@
 use std::path::PathBuf;
 
 use effigy_registration::motion::Routine;
-use effigy_sim_sensor::{MotionChoice, OutfitKind, Scenario, SensorPreset, StrangerChoice};
+use effigy_sim_sensor::{MotionChoice, Mount, OutfitKind, Scenario, SensorPreset, StrangerChoice};
 
 /// The people of the test split: nothing was ever tuned on them. Settings are tuned on 104 to 106.
 const TEST_PEOPLE: [u64; 3] = [101, 102, 103];
+
+/// The sensor stands 2 m before the person, where a D435 just sees raised hands.
+const MOUNT: Mount = Mount { height_m: 1.1, distance_m: 2.0, down_rad: 0.0 };
 
 /// Strangers are watched for as long as this.
 const STRANGER_SECS: f32 = 5.0;
@@ -119,6 +122,14 @@ impl Case {
         }
     }
 
+    /// Whether it shows the same simulated clothes, by another sensor.
+    pub(super) fn shares_clothes_with(&self, other: &Self) -> bool {
+        let seen_alike = Scenario { sensor: other.scenario.sensor, ..self.scenario.clone() };
+        self.scenario.outfit.cloth().is_some()
+            && self.purpose == other.purpose
+            && seen_alike == other.scenario
+    }
+
     fn clip(&self) -> Option<&str> {
         self.scenario.stranger.as_ref()?.clip.as_deref()
     }
@@ -173,7 +184,13 @@ impl Suite {
         for &sensor in &self.sensors {
             for &outfit in self.outfits.iter().chain(&self.in_cloth) {
                 for &seed in &self.people {
-                    let scenario = Scenario { seed, sensor, outfit, ..Scenario::default() };
+                    let scenario = Scenario {
+                        seed,
+                        sensor,
+                        outfit,
+                        mount: Some(MOUNT),
+                        ..Scenario::default()
+                    };
                     self.perform(&scenario, &mut cases);
                 }
             }
@@ -203,6 +220,7 @@ impl Suite {
                         let stranger = StrangerChoice { path: file.clone(), clip, height_m: None };
                         let scenario = Scenario {
                             sensor,
+                            mount: Some(MOUNT),
                             motion,
                             seconds: self.most_secs.min(STRANGER_SECS),
                             stranger: Some(stranger),
