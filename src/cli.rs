@@ -47,7 +47,7 @@ pub(crate) enum Command {
     /// Turn other people's recordings into ours
     #[command(after_help = "Example: effigy import tum rgbd_dataset_freiburg1_xyz --out s.mcap")]
     Import(ImportArgs),
-    /// Say what a recording, a folder, an avatar or a body file holds
+    /// Say what a recording, a folder, an avatar, a body, a network or a data set holds
     #[command(after_help = "Example: effigy info s.mcap")]
     Info(InfoArgs),
     /// Print every setting that `--config` takes, with its default
@@ -266,7 +266,7 @@ pub(crate) enum ImportKind {
 
 #[derive(Debug, Args)]
 pub(crate) struct InfoArgs {
-    /// A recording, a folder or single file of depth images, an avatar or a body model
+    /// A recording, a folder or single file of depth images, an avatar, a body model, a network or a data set
     pub(crate) input: PathBuf,
     /// Write what is printed as JSON too
     #[arg(long, value_name = "FILE")]
@@ -434,9 +434,9 @@ pub(crate) struct TrainSkinningArgs {
     /// The networks' size; `paper` is only counted
     #[arg(long, value_enum, default_value = "live")]
     pub(crate) preset: TrainPreset,
-    /// Which clouds, and how the networks start
-    #[arg(long, default_value_t = 1)]
-    pub(crate) seed: u64,
+    /// Which clouds, and how the networks start; 1, or what the settings say, where none is given
+    #[arg(long)]
+    pub(crate) seed: Option<u64>,
     /// Instead of the preset's number of steps
     #[arg(long)]
     pub(crate) steps: Option<u32>,
@@ -472,9 +472,9 @@ pub(crate) struct TrainShared {
     /// The networks' size; `paper` would take weeks
     #[arg(long, value_enum, default_value = "live")]
     pub(crate) preset: TrainPreset,
-    /// Which people, poses and points
-    #[arg(long, default_value_t = 1)]
-    pub(crate) seed: u64,
+    /// Which people, poses and points; 1, or what the settings say, where none is given
+    #[arg(long)]
+    pub(crate) seed: Option<u64>,
     /// Go on from the checkpoint beside the output
     #[arg(long)]
     pub(crate) resume: bool,

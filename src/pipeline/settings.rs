@@ -1,9 +1,6 @@
 //! All stages' settings in one file.
 
-use std::{
-    fs,
-    path::{Path, PathBuf},
-};
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, ensure};
 use effigy_avatar::{
@@ -123,13 +120,8 @@ impl Settings {
         let (prior, name) = match &self.prior {
             None => (hyper::prior(), "the built-in prior".to_owned()),
             Some(path) => {
-                let name = path.display().to_string();
-                let bytes =
-                    fs::read(path).with_context(|| format!("{name}: cannot read the prior"))?;
-                (
-                    HyperNetwork::from_bytes(&bytes).with_context(|| name.clone())?,
-                    name,
-                )
+                let prior = HyperNetwork::load(path).context("cannot read the prior")?;
+                (prior, path.display().to_string())
             }
         };
         ensure!(

@@ -1,6 +1,6 @@
 //! A hypernetwork as bytes: safetensors, with configuration and provenance in the metadata.
 
-use std::{collections::HashMap, sync::Arc};
+use std::{collections::HashMap, fs::File, io::Read as _, path::Path, sync::Arc};
 
 use half::f16;
 use safetensors::{Dtype, SafeTensors, serialize, tensor::TensorView};
@@ -17,6 +17,7 @@ const FORMAT: &str = "effigy-hypernetwork-1";
 const MAX_HIDDEN: usize = 1024;
 const MAX_LAYERS: usize = 16;
 const MAX_PARAMETERS: usize = 400_000_000;
+const MAX_FILE_BYTES: u64 = 4 * MAX_PARAMETERS as u64 + (1 << 20);
 
 /// How numbers are stored. `phi*` and all biases stay f32 in both: they carry most of the field.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -75,6 +76,16 @@ impl HyperNetwork {
         let tensors = self.tensors();
         let values = tensors.iter().flat_map(|tensor| tensor.values);
         values.flat_map(|x| x.to_le_bytes()).collect()
+    }
+
+    /// Reads a file; see [`Self::from_bytes`].
+    pub fn load(path: &Path) -> Result<Self, AvatarError> {
+        let io = |source| AvatarError::Io { path: path.to_owned(), source };
+        let file = File::open(path).map_err(io)?;
+        let mut bytes = Vec::new();
+        let read = file.take(MAX_FILE_BYTES).read_to_end(&mut bytes);
+        read.map_err(io)?;
+        Self::from_bytes(&bytes).map_err(AvatarError::in_file(path))
     }
 
     /// Reads what [`Self::to_bytes`] wrote; refuses unknown formats, wrong shapes and numbers that are not

@@ -99,6 +99,11 @@ pub struct Dataset {
 }
 
 impl Dataset {
+    /// Whether a folder holds a complete data set, of whatever version.
+    pub fn is_at(folder: &Path) -> bool {
+        folder.join(MANIFEST).is_file()
+    }
+
     /// Opens a complete data set that was made with this body.
     pub fn open(folder: &Path, body: &BodyModel) -> Result<Self, SimError> {
         let path = folder.join(MANIFEST);

@@ -61,13 +61,8 @@ fn hyper(args: &TrainHyperArgs) -> anyhow::Result<()> {
 
 /// The field to start from.
 fn read_start(path: &Path, job: &Job<'_>) -> anyhow::Result<HyperNetwork> {
-    let bytes = fs::read(path).with_context(|| {
-        format!(
-            "{}: cannot read the field to start from; make it with `effigy train sdf`",
-            path.display()
-        )
-    })?;
-    let start = HyperNetwork::from_bytes(&bytes).with_context(|| path.display().to_string())?;
+    let start = HyperNetwork::load(path)
+        .context("cannot read the field to start from; make it with `effigy train sdf`")?;
     if start.config() != job.config.network {
         bail!(
             "{}: its networks are {:?}, expected {:?}; make it with the same --preset",
@@ -105,16 +100,15 @@ impl<'a> Job<'a> {
             );
         }
         files::check_writable(&checkpoint.with_extension("partial"))?;
+        let mut config = config(args)?;
         let body = builtin::body();
-        let (people, judges) = people(args, every, &body)?;
+        let (people, judges) = people(args, (every, config.seed), &body)?;
         say!(
             "{} people to learn from in cloth, mirror images included; {} to judge; seed {}",
             people.cloth.as_ref().map_or(0, ClothPeople::count),
             judges.len(),
-            args.seed
+            config.seed
         );
-        let mut config = config(args)?;
-        config.seed = args.seed;
         if config.joint.people == 0 {
             config.joint.people = people.count();
         }
@@ -162,7 +156,7 @@ impl<'a> Job<'a> {
         let data = &self.people.described;
         network.provenance = Provenance {
             body: Some(self.body.identity),
-            training: format!("effigy train {what}, --seed {}, {data}", self.args.seed),
+            training: format!("effigy train {what}, --seed {}, {data}", self.config.seed),
             is_placeholder: false,
         };
         let bytes = network.to_bytes(precision)?;
@@ -176,10 +170,10 @@ impl<'a> Job<'a> {
 /// Those who teach, and those who judge.
 fn people(
     args: &TrainShared,
-    every: usize,
+    (every, seed): (usize, u64),
     body: &Arc<BodyModel>,
 ) -> anyhow::Result<(People, Vec<Judge>)> {
-    let offsets = OffsetPeople { body: Arc::clone(body), seed: args.seed };
+    let offsets = OffsetPeople { body: Arc::clone(body), seed };
     let Some(path) = &args.data else {
         let described = "people in offset clothes".to_owned();
         return Ok((
@@ -220,6 +214,7 @@ fn config(args: &TrainShared) -> anyhow::Result<PriorConfig> {
         Some(path) => files::read_toml(path)?,
         None => PriorConfig::default(),
     };
+    config.seed = args.seed.unwrap_or(config.seed);
     if args.preset == TrainPreset::Paper {
         config.network = HyperConfig::PAPER;
     }

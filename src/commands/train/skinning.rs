@@ -36,7 +36,7 @@ pub(crate) fn run(args: &TrainSkinningArgs) -> anyhow::Result<()> {
         Some(path) => files::read_toml(path)?,
         None => SkinningTrainConfig::default(),
     };
-    config.seed = args.seed;
+    config.seed = args.seed.unwrap_or(config.seed);
     if let Some(steps) = args.steps {
         config.steps = steps;
     }
@@ -83,7 +83,7 @@ pub(crate) fn run(args: &TrainSkinningArgs) -> anyhow::Result<()> {
     };
     networks.provenance.training = format!(
         "effigy train skinning --preset live --seed {} ({} steps), data set of seed {}",
-        args.seed,
+        config.seed,
         config.steps,
         dataset.manifest().seed
     );
