@@ -3,7 +3,11 @@
 use std::path::Path;
 
 use anyhow::{Context as _, bail};
-use effigy_avatar::{AvatarError, checkpoint, hyper::{HyperNetwork, Provenance}, skinning::SkinningNetworks};
+use effigy_avatar::{
+    AvatarError, checkpoint,
+    hyper::{HyperNetwork, Provenance},
+    skinning::SkinningNetworks,
+};
 use effigy_capture::{recording, source};
 use effigy_registration::{BodyModel, smpl::builtin};
 use effigy_sim_sensor::dataset::{Dataset, Split};

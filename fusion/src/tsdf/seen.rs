@@ -41,10 +41,9 @@ impl Seen {
             .for_each(|(row, (planes, weights))| {
                 let first = (region.rows.start + row) * view.points.width + region.columns.start;
                 for ((pixel, plane), own) in (first..).zip(planes).zip(weights) {
-                    let found = plane_of(view, pixel).map(|plane| (plane, weight(pixel)));
-                    (*plane, *own) = found
-                        .filter(|(_, weight)| counts(*weight))
-                        .unwrap_or_default();
+                    let weight = Some(weight(pixel)).filter(|&weight| counts(weight));
+                    let found = weight.and_then(|weight| Some((plane_of(view, pixel)?, weight)));
+                    (*plane, *own) = found.unwrap_or_default();
                 }
             });
     }

@@ -106,20 +106,22 @@ impl Reach {
         for y in rows {
             let row = &view.points.points[y * width..][..width];
             for (first, points) in (0..).step_by(LANES).zip(row.chunks(LANES)) {
-                if points.iter().all(|point| point.z.is_nan()) {
+                let start = y * width + first;
+                let mut has_say = [false; LANES];
+                for (i, (point, has_say)) in points.iter().zip(&mut has_say).enumerate() {
+                    *has_say = !point.z.is_nan() && counts(weight(start + i));
+                }
+                if !has_say.contains(&true) {
                     continue;
                 }
+                touched_rows = touched_rows.start.min(y)..y + 1;
                 simd::run(
                     #[inline(always)]
                     || self.reach(points, &mut reached),
                 );
-                for (i, point) in points.iter().enumerate() {
+                for i in (0..LANES).filter(|&i| has_say[i]) {
                     let x = first + i;
-                    if point.z.is_nan() || !counts(weight(y * width + x)) {
-                        continue;
-                    }
                     columns = columns.start.min(x)..columns.end.max(x + 1);
-                    touched_rows = touched_rows.start.min(y)..y + 1;
                     for (step, before) in reached.iter().zip(&mut before) {
                         let block = [step[0][i], step[1][i], step[2][i]];
                         let is_other = block != *before;
