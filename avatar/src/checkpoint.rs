@@ -436,7 +436,7 @@ mod tests {
             panic!("{error}");
         };
         assert!(
-            matches!(*source, AvatarError::UnknownField { .. }),
+            matches!(&*source, AvatarError::UnknownField { found, .. } if found == "sphere"),
             "{source}"
         );
     }

@@ -13,7 +13,6 @@ use crate::{
     mesher::{self, FieldAt},
     model::Avatar,
     pose_input::PoseInput,
-    sdf::SignedDistanceField,
     skinning::{Skinning, Warp},
 };
 
@@ -193,12 +192,6 @@ impl Driver {
         true
     }
 
-    /// Leaves the vertices in `self.points`.
-    fn place_by_field(&mut self, pose: &PoseInput) {
-        let sdf = self.avatar.field.field(pose);
-        self.project(&*sdf);
-    }
-
     /// How far each vertex lies along its topology normal from its topology place in a pose, metres; found in the full
     /// field.
     pub fn offsets_m(&mut self, pose: &PoseInput) -> &[f32] {
@@ -210,9 +203,10 @@ impl Driver {
         &self.offsets
     }
 
-    /// Moves the topology's vertices onto the zero level of this field; the result is in `self.points`, how far each went
-    /// in `self.offsets`, both in unit lengths.
-    fn project(&mut self, sdf: &dyn SignedDistanceField) {
+    /// Moves the topology's vertices onto the zero level of a pose's field; the result is in `self.points`, how far each
+    /// went in `self.offsets`, both in unit lengths.
+    fn place_by_field(&mut self, pose: &PoseInput) {
+        let sdf = self.avatar.field.field(pose);
         let topology = &self.avatar.topology;
         let metres_per_unit = self.avatar.subject.unit_box.metres_per_unit();
         let settled = self.config.settled_m / metres_per_unit;
@@ -225,7 +219,7 @@ impl Driver {
             self.queries.clear();
             self.queries
                 .extend(self.open.iter().map(|&vertex| self.points[vertex as usize]));
-            let mut values = self.field_at.values(sdf, &self.queries).iter();
+            let mut values = self.field_at.values(&*sdf, &self.queries).iter();
             self.open.retain(|&vertex| {
                 let vertex = vertex as usize;
                 let value = *values.next().expect("one value a query");

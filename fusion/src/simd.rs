@@ -90,7 +90,8 @@ fn in_avx2<R>(body: impl FnOnce() -> R) -> R {
     body()
 }
 
-/// The nearest whole number to a value of less than four million in size; of others anything. A vector unit does several
+/// The nearest whole number to a value of less than four million in size; of all others, what is no number included,
+/// something that is four million or more as a `u32`. A vector unit does several
 /// at a time, where a conversion, which asks what is too large or no number, is done one by one.
 #[inline(always)]
 pub(crate) fn nearest_whole(value: f32) -> i32 {
@@ -131,6 +132,28 @@ mod tests {
                 value.round_ties_even() as i32,
                 "{value}"
             );
+        }
+    }
+
+    #[test]
+    fn what_is_too_large_stays_far_outside_of_every_picture() {
+        let sizes = [
+            4.2e6,
+            8.4e6,
+            1.0e7,
+            12_582_912.0,
+            1.3e7,
+            1.0e9,
+            1.0e30,
+            f32::INFINITY,
+        ];
+        for value in sizes
+            .into_iter()
+            .flat_map(|size| [size, -size])
+            .chain([f32::NAN, -f32::NAN])
+        {
+            let outside = nearest_whole(value) as u32;
+            assert!(outside >= 4_000_000, "{value} became {outside}");
         }
     }
 

@@ -196,7 +196,7 @@ impl SensorPreset {
     }
 
     /// Far enough away for a tall person's raised hands and both feet to be in view.
-    pub fn mount(self) -> Mount {
+    fn mount(self) -> Mount {
         match self {
             Self::Azure | Self::D435 | Self::D455 => {
                 Mount { height_m: 1.20, distance_m: 2.45, down_rad: 0.02 }
@@ -208,7 +208,7 @@ impl SensorPreset {
 }
 
 impl Mount {
-    pub fn world_from_camera(self) -> Rigid3 {
+    pub(crate) fn world_from_camera(self) -> Rigid3 {
         // Half a turn about x makes "down, forward" of "up, backward"; less than that tilts down.
         let rotation = Quat::from_rotation_x(std::f32::consts::PI - self.down_rad);
         let translation: Vec3 = vec3(0.0, self.height_m, self.distance_m);

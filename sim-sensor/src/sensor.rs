@@ -8,7 +8,7 @@ use effigy_registration::BodyModel;
 use crate::{
     error::SimError,
     noise,
-    preset::{Mount, SensorPreset},
+    preset::SensorPreset,
     render::{ColorCamera, Renderer, View},
     scenario::{Noise, Scenario},
     scene::Scene,
@@ -41,14 +41,14 @@ impl SimulatedSensor {
         Ok(Self::before(actor, scenario))
     }
 
-    /// Another sensor before the same person. Clothes are simulated once for both while neither runs ahead; the other one's
-    /// frames come at this one's rate. `None` before somebody else's character.
-    pub fn beside(&self, sensor: SensorPreset, mount: Option<Mount>) -> Option<Self> {
+    /// Another sensor before the same person, at the scenario's mount or, without one, at its own, and at this one's rate.
+    /// Clothes are simulated once for both while neither runs ahead. `None` before somebody else's character.
+    pub fn beside(&self, sensor: SensorPreset) -> Option<Self> {
         let Actor::Person(scene) = &self.actor else {
             return None;
         };
         let rate_hz = Some(self.scenario.rate_hz());
-        let scenario = Scenario { sensor, mount, rate_hz, ..self.scenario.clone() };
+        let scenario = Scenario { sensor, rate_hz, ..self.scenario.clone() };
         let scene = scene.seen_as(&scenario);
         Some(Self::before(Actor::Person(Box::new(scene)), scenario))
     }

@@ -91,7 +91,7 @@ fn made(Provenance { body, training, is_placeholder }: &Provenance) -> Value {
 fn dataset_facts(path: &Path) -> anyhow::Result<Value> {
     let dataset = Dataset::open(path, &builtin::body())?;
     let manifest = dataset.manifest();
-    let people = |split| manifest.wearers(split).len();
+    let wearers = |split| manifest.wearers(split).len();
     Ok(json!({
         "kind": "data set",
         "schema": manifest.schema,
@@ -100,8 +100,8 @@ fn dataset_facts(path: &Path) -> anyhow::Result<Value> {
         "sequences": manifest.sequences.len(),
         "frames": manifest.frames,
         "bytes": manifest.bytes,
-        "people_to_learn_from": people(Split::Train),
-        "people_to_test_on": people(Split::Test),
+        "people_in_outfits_to_learn_from": wearers(Split::Train),
+        "people_in_outfits_to_test_on": wearers(Split::Test),
     }))
 }
 

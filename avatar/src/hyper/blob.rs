@@ -1,6 +1,6 @@
 //! A hypernetwork as bytes: safetensors, with configuration and provenance in the metadata.
 
-use std::{collections::HashMap, fs::File, io::Read as _, path::Path, sync::Arc};
+use std::{collections::HashMap, path::Path, sync::Arc};
 
 use half::f16;
 use safetensors::{Dtype, SafeTensors, serialize, tensor::TensorView};
@@ -9,7 +9,7 @@ use super::{
     config::{HeadKind, HyperConfig},
     network::{HyperNetwork, Provenance},
 };
-use crate::{PoseField, error::AvatarError};
+use crate::{PoseField, error::AvatarError, nn::file::read_at_most};
 
 /// Version of the layout; a reader refuses any other.
 const FORMAT: &str = "effigy-hypernetwork-1";
@@ -80,11 +80,7 @@ impl HyperNetwork {
 
     /// Reads a file; see [`Self::from_bytes`].
     pub fn load(path: &Path) -> Result<Self, AvatarError> {
-        let io = |source| AvatarError::Io { path: path.to_owned(), source };
-        let file = File::open(path).map_err(io)?;
-        let mut bytes = Vec::new();
-        let read = file.take(MAX_FILE_BYTES).read_to_end(&mut bytes);
-        read.map_err(io)?;
+        let bytes = read_at_most(path, MAX_FILE_BYTES)?;
         Self::from_bytes(&bytes).map_err(AvatarError::in_file(path))
     }
 

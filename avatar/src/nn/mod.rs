@@ -6,6 +6,7 @@ pub(crate) mod adam;
 pub(crate) mod convolution;
 pub(crate) mod dense;
 pub(crate) mod field_mlp;
+pub(crate) mod file;
 #[cfg(test)]
 mod gradient_tests;
 pub(crate) mod group_norm;

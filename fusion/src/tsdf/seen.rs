@@ -41,9 +41,9 @@ impl Seen {
             .for_each(|(row, (planes, weights))| {
                 let first = (region.rows.start + row) * view.points.width + region.columns.start;
                 for ((pixel, plane), own) in (first..).zip(planes).zip(weights) {
-                    let weight = Some(weight(pixel)).filter(|&weight| counts(weight));
-                    let found = weight.and_then(|weight| Some((plane_of(view, pixel)?, weight)));
-                    (*plane, *own) = found.unwrap_or_default();
+                    let say = weight(pixel);
+                    let found = counts(say).then(|| plane_of(view, pixel)).flatten();
+                    (*plane, *own) = found.map(|plane| (plane, say)).unwrap_or_default();
                 }
             });
     }

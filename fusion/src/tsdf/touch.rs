@@ -167,11 +167,12 @@ impl Reach {
     }
 }
 
-/// Most of the blocks that were there already: a place for each of a few neighbours, the last of which it keeps.
+/// Which blocks came up lately: a direct-mapped cache, in which blocks that are a whole number of its sides apart share a
+/// place. It may call a block new a second time, never one old that is new.
 struct Noted([[i32; 3]; Self::SIDE.pow(3)]);
 
 impl Noted {
-    /// Blocks that a person's rows of pixels reach are not as many along any axis.
+    /// In blocks: a person's rows of pixels reach fewer along most axes.
     const SIDE: usize = 8;
 
     fn is_new(&mut self, block: [i32; 3]) -> bool {

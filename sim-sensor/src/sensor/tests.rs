@@ -7,7 +7,7 @@ use glam::Vec3;
 use super::*;
 use crate::{
     person::OutfitKind,
-    preset::SensorPreset,
+    preset::{Mount, SensorPreset},
     scenario::{Likeness, MotionChoice, Room},
     truth::Truth,
 };
@@ -71,11 +71,12 @@ fn sensors_beside_each_other_see_what_each_sees_alone() {
     let mount = Mount { height_m: 1.1, distance_m: 2.0, down_rad: 0.0 };
     let scenario = Scenario {
         outfit: OutfitKind::TshirtTrousers,
+        mount: Some(mount),
         ..scenario(SensorPreset::Azure, Routine::Wave)
     };
     let mut azure = SimulatedSensor::new(&scenario, builtin::body()).unwrap();
-    let mut beside = azure.beside(SensorPreset::D435, Some(mount)).unwrap();
-    let alone = Scenario { sensor: SensorPreset::D435, mount: Some(mount), ..scenario };
+    let mut beside = azure.beside(SensorPreset::D435).unwrap();
+    let alone = Scenario { sensor: SensorPreset::D435, ..scenario };
     let mut alone = SimulatedSensor::new(&alone, builtin::body()).unwrap();
     for id in [0, 1, 2].map(FrameId) {
         azure.expose(id).unwrap();

@@ -1,6 +1,6 @@
 //! The networks as bytes: safetensors in half precision, with sizes and provenance in the metadata.
 
-use std::{collections::HashMap, fs, io::Read as _, path::Path, sync::OnceLock};
+use std::{collections::HashMap, path::Path, sync::OnceLock};
 
 use effigy_registration::smpl::{BodyIdentity, JOINT_COUNT};
 use half::f16;
@@ -9,7 +9,7 @@ use safetensors::{Dtype, SafeTensors, serialize, tensor::TensorView};
 use super::{
     BODY_FEATURES, MIXTURE_OUTPUTS, NetworkConfig, SkinningNetwork, SkinningNetworks, net::Net,
 };
-use crate::{error::AvatarError, hyper::Provenance};
+use crate::{error::AvatarError, hyper::Provenance, nn::file::read_at_most};
 
 /// Version of the layout; a reader refuses any other.
 pub const NETWORKS_FORMAT: &str = "effigy-skinning-1";
@@ -96,10 +96,7 @@ impl SkinningNetworks {
 
     /// Reads a file of networks that were trained with this body.
     pub fn load(path: &Path, body: BodyIdentity) -> Result<Self, AvatarError> {
-        let io = |source| AvatarError::Io { path: path.to_owned(), source };
-        let file = fs::File::open(path).map_err(io)?;
-        let mut bytes = Vec::new();
-        file.take(MOST_BYTES).read_to_end(&mut bytes).map_err(io)?;
+        let bytes = read_at_most(path, MOST_BYTES)?;
         let networks = Self::from_bytes(&bytes).map_err(AvatarError::in_file(path))?;
         networks.of_body(body, path)
     }

@@ -1,4 +1,4 @@
-//! One case from its first frame to its last: sensor, cleaning, tracking, and the truth beside them.
+//! One person from the first frame to the last: sensors, cleaning, tracking, and the truth beside them.
 
 use std::sync::Arc;
 
@@ -26,15 +26,15 @@ pub(super) fn follow(
     options: &Options,
 ) -> anyhow::Result<Vec<CaseScores>> {
     let (first, others) = cases.split_first().context("nobody to follow")?;
-    let sensor = SimulatedSensor::new(&first.scenario, Arc::clone(body))?;
-    let mut watches = Vec::with_capacity(cases.len());
+    let mut sensors = vec![SimulatedSensor::new(&first.scenario, Arc::clone(body))?];
     for case in others {
-        let scenario = &case.scenario;
-        let beside = sensor.beside(scenario.sensor, scenario.mount);
-        let beside = beside.context("a stranger is watched by one sensor at a time")?;
-        watches.push(Watch::new(case, beside, body, options)?);
+        let beside = sensors[0].beside(case.scenario.sensor);
+        sensors.push(beside.context("a stranger is watched by one sensor at a time")?);
     }
-    watches.insert(0, Watch::new(first, sensor, body, options)?);
+    let watches = cases.iter().zip(sensors);
+    let mut watches = watches
+        .map(|(case, sensor)| Watch::new(case, sensor, body, options))
+        .collect::<anyhow::Result<Vec<_>>>()?;
     let moments = moments(first);
     for (number, moment) in moments.iter().enumerate() {
         for watch in &mut watches {

@@ -124,10 +124,10 @@ impl Case {
 
     /// Whether it shows the same simulated clothes, by another sensor.
     pub(super) fn shares_clothes_with(&self, other: &Self) -> bool {
-        let seen_alike = Scenario { sensor: other.scenario.sensor, ..self.scenario.clone() };
-        self.scenario.outfit.cloth().is_some()
-            && self.purpose == other.purpose
-            && seen_alike == other.scenario
+        let seen_alike = || {
+            Scenario { sensor: other.scenario.sensor, ..self.scenario.clone() } == other.scenario
+        };
+        self.scenario.outfit.cloth().is_some() && self.purpose == other.purpose && seen_alike()
     }
 
     fn clip(&self) -> Option<&str> {
